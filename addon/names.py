@@ -9,6 +9,7 @@ CATEGORY = "ARAP Fields"  # tab of the sidebar
 RESULTS = "ARAP Fields"  # collection that holds results
 CONTEXT = "ARAP Fields"  # of our texts' translations, which Blender's own would replace otherwise
 PROPERTY = "arapfields"  # object.arapfields
+BONE_NUMBER = "arapfields_number"  # of a bone that is a handle; it stays where the bone is renamed
 REPORT = "arapfields_report"  # custom property of results: figures as JSON
 CORRECTIVE = "ARAP Corrective "  # how names of shape keys begin that go with skin weights
 WARP_KEY = "ARAP Fields"  # shape key that carries the motion

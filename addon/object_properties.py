@@ -12,7 +12,7 @@ from .contact.properties import ARAPFIELDS_PG_contact
 from .core.settings.choices import NORMALS
 from .handles.properties import ARAPFIELDS_PG_handle
 from .live.properties import ARAPFIELDS_PG_secondary
-from .names import PROPERTY
+from .names import BONE_NUMBER, PROPERTY
 from .pin_tool.properties import ARAPFIELDS_PG_scene
 from .properties.choices import RESULT_ITEMS, extraction, output, result, surface
 from .properties.solve_settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
@@ -113,6 +113,7 @@ CLASSES = [ARAPFIELDS_PG_result, ARAPFIELDS_PG_object]
 
 
 def attach():
+    setattr(bpy.types.Bone, BONE_NUMBER, bpy.props.IntProperty(name="ARAP Fields", options={"HIDDEN"}))
     setattr(
         bpy.types.Object, PROPERTY, bpy.props.PointerProperty(type=ARAPFIELDS_PG_object, name="ARAP Fields")
     )
@@ -125,3 +126,5 @@ def detach():
     for owner in (bpy.types.Object, bpy.types.Scene):
         if hasattr(owner, PROPERTY):
             delattr(owner, PROPERTY)
+    if hasattr(bpy.types.Bone, BONE_NUMBER):
+        delattr(bpy.types.Bone, BONE_NUMBER)

@@ -13,7 +13,8 @@ from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..core.errors import UserError, refuse
 from ..core.geometry import posing
 from ..core.geometry.spaces import inverse, transform
-from ..handles.movers import matrix_of
+from ..handles.movers import matrix_of, numbered
+from ..names import BONE_NUMBER
 
 LEAST_BONE = 1e-5  # of the object's size; Blender removes bones without a length
 
@@ -81,7 +82,8 @@ class Fitting:
         for reference, names, heads, tails, axes in self.moved:
             rig = reference.get()
             if not settings_of(rig).rest_bones:
-                settings_of(rig).rest_bones = json.dumps(rest_of(rig))
+                rest = {name: [*ends, numbered(rig, name)] for name, ends in rest_of(rig).items()}
+                settings_of(rig).rest_bones = json.dumps(rest)
             write(context, rig, dict(zip(names, zip(heads, tails, axes, strict=True), strict=True)))
 
 
@@ -93,10 +95,17 @@ def rest_of(rig):
     }
 
 
+def noted(rig):
+    """The same of the bones before they were fitted, by the names that they have now."""
+    names = {getattr(bone, BONE_NUMBER): bone.name for bone in reversed(rig.data.bones)}
+    known = json.loads(settings_of(rig).rest_bones or "{}")
+    numbers = {name: ends[3] if ends[3:] else 0 for name, ends in known.items()}
+    return {names.get(numbers[name] or None, name): ends[:3] for name, ends in known.items()}
+
+
 def resting(rig):
     """(names, (k, 4, 4) poses, (k) lengths) of the bones as they were before any fit."""
-    noted = settings_of(rig).rest_bones
-    ends = rest_of(rig) | (json.loads(noted) if noted else {})
+    ends = rest_of(rig) | noted(rig)
     names = [bone.name for bone in rig.data.bones]
     poses, lengths = np.tile(np.eye(4), (len(names), 1, 1)), []
     for pose, name in zip(poses, names, strict=True):
@@ -130,7 +139,7 @@ def reset(context, source):
     """Gives the bones of a source's armatures the rest that they had before they were fitted."""
     for rig in fitted(source):
         refuse(refusal(rig))
-        write(context, rig, json.loads(settings_of(rig).rest_bones))
+        write(context, rig, noted(rig))
         settings_of(rig).rest_bones = ""
 
 

@@ -13,11 +13,11 @@ def silence(source):
     noted = read(source)
     for modifier in source.modifiers:
         if modifier_stack.is_replaced(modifier, rigs):
-            if modifier.name not in noted:
-                noted[modifier.name] = [modifier.show_viewport, modifier.show_render]
+            if key_in(noted, modifier) is None:
+                noted[str(modifier.persistent_uid)] = [modifier.show_viewport, modifier.show_render]
             modifier.show_viewport = modifier.show_render = False
-        elif modifier.name in noted:
-            modifier.show_viewport, modifier.show_render = noted.pop(modifier.name)
+        elif key_in(noted, modifier) is not None:
+            modifier.show_viewport, modifier.show_render = noted.pop(key_in(noted, modifier))
     write(source, noted)
 
 
@@ -25,9 +25,15 @@ def restore(source):
     """Has all of them as they were."""
     noted = read(source)
     for modifier in source.modifiers:
-        if modifier.name in noted:
-            modifier.show_viewport, modifier.show_render = noted[modifier.name]
+        if key_in(noted, modifier) is not None:
+            modifier.show_viewport, modifier.show_render = noted[key_in(noted, modifier)]
     write(source, {})
+
+
+def key_in(noted, modifier):
+    """By what a modifier is noted: its number, or its name in files of earlier versions; or None."""
+    keys = str(modifier.persistent_uid), modifier.name
+    return next((key for key in keys if key in noted), None)
 
 
 def read(source):

@@ -61,7 +61,7 @@ def unposed(context, source):
 
     A carried mesh goes with the source alone: not with bones that only its own vertex groups name.
     """
-    handles = {(entry.rig, entry.bone) for entry in settings_of(source).handles if entry.kind == "BONE"}
+    handles = {(entry.rig, movers.bone_of(entry)) for entry in settings_of(source).handles if is_bone(entry)}
     rigs, names = {rig for rig, _ in handles if in_scene(rig)}, []
     for entry in settings_of(source).carried:
         item = entry.item
@@ -84,7 +84,13 @@ def unposed(context, source):
 def find(source, rig, name):
     """Index of the bone's handle in the source's list, or -1."""
     entries = enumerate(settings_of(source).handles)
-    return next((i for i, e in entries if e.kind == "BONE" and e.rig == rig and e.bone == name), -1)
+    own = ((index, entry) for index, entry in entries if is_bone(entry) and entry.rig == rig)
+    return next((index for index, entry in own if movers.bone_of(entry) == name), -1)
+
+
+def is_bone(entry):
+    """Whether a handle is the bone of an armature, one that is there."""
+    return entry.kind == "BONE" and entry.rig is not None
 
 
 def add(source, rig, name, groups):
@@ -95,6 +101,7 @@ def add(source, rig, name, groups):
     index = find(source, rig, name)
     entry = empties.choose_or_add(settings_of(source), index)
     entry.kind, entry.rig, entry.bone = "BONE", rig, name
+    entry.number = movers.numbered(rig, name)
     if index < 0:
         entry.group = name if name in groups else ""
         entry.hold_from = HOLD_FROM
@@ -125,10 +132,11 @@ def rest_in_world(rig, name):
 
 def mirror(context, source, entry):
     """A handle of the bone on the other side."""
-    name = bpy.utils.flip_name(entry.bone)
-    if name == entry.bone or name not in entry.rig.data.bones:
+    bone = movers.bone_of(entry)
+    name = bpy.utils.flip_name(bone)
+    if name == bone or name not in entry.rig.data.bones:
         raise UserError(
-            "The armature {rig} has no bone on the other side of {bone}", rig=entry.rig.name, bone=entry.bone
+            "The armature {rig} has no bone on the other side of {bone}", rig=entry.rig.name, bone=bone
         )
     kept = movers.user_settings(entry)
     movers.put_user_settings(add(source, entry.rig, name, holding_groups(context, source)), kept)
@@ -136,8 +144,9 @@ def mirror(context, source, entry):
 
 def reset(context, source, entries):
     """Poses the bones of these handles as they were at rest, parents first."""
-    for entry in sorted(entries, key=lambda entry: len(entry.rig.data.bones[entry.bone].parent_recursive)):
-        box = movers.bone_box(entry.rig.data.bones[entry.bone])
+    named = [(entry, movers.bone_of(entry)) for entry in entries]
+    for entry, name in sorted(named, key=lambda one: len(one[0].rig.data.bones[one[1]].parent_recursive)):
+        box = movers.bone_box(entry.rig.data.bones[name])
         target = np.linalg.inv(empties.matrix_of(entry.rig)) @ empties.rest_box(source, entry)
-        entry.rig.pose.bones[entry.bone].matrix = Matrix((target @ np.linalg.inv(box)).tolist())
+        entry.rig.pose.bones[name].matrix = Matrix((target @ np.linalg.inv(box)).tolist())
         context.view_layer.update()

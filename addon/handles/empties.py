@@ -66,7 +66,7 @@ def find(source, empty):
 
 def group_names(source):
     """The vertex groups that the source's handles hold."""
-    return [e.group for e in used(source) if e.kind == "GROUP" or (e.kind == "BONE" and e.group)]
+    return [movers.group_of(e) for e in used(source) if e.kind == "GROUP" or (e.kind == "BONE" and e.group)]
 
 
 def solve_handles(source, space, weights=None, where=matrix_of):
@@ -79,7 +79,8 @@ def solve_handles(source, space, weights=None, where=matrix_of):
     handles = []
     for entry in used(source):
         boxes = movers.rest_of(entry), where(source), box_now(entry, where)
-        held = weights[entry.group] if weights and entry.group and entry.kind in ("GROUP", "BONE") else None
+        group = movers.group_of(entry) if entry.kind in ("GROUP", "BONE") else ""
+        held = weights[group] if weights and group else None
         options = {"weights": held, "weight": entry.weight, "hold_from": entry.hold_from}
         options["reach"] = from_single_precision(entry.reach)
         options["allow_scale"] = entry.allow_scale and entry.kind != "POINT"

@@ -67,7 +67,7 @@ def counting(context, source):
 def region_of(entry, weights):
     """A handle where it is at rest, in the source's coordinates."""
     rest = movers.rest_of(entry)
-    return Handle("", entry.kind, rest, rest, weights.get(entry.group), hold_from=entry.hold_from)
+    return Handle("", entry.kind, rest, rest, weights.get(movers.group_of(entry)), hold_from=entry.hold_from)
 
 
 def points_inside(mesh, regions):

@@ -5,6 +5,7 @@ import numpy as np
 
 from ..blender.object_references import in_scene
 from ..core.geometry.handles import box_matrix
+from ..names import BONE_NUMBER
 
 
 def matrix_of(item, bone=""):
@@ -23,10 +24,50 @@ def current_box(empty, where=matrix_of):
     return box_matrix(where(empty), empty.empty_display_size)
 
 
+def bone_of(entry):
+    """The name that a handle's bone has now."""
+    bones = entry.rig.data.bones
+    named = bones.get(entry.bone)
+    if not entry.number or (named is not None and getattr(named, BONE_NUMBER) == entry.number):
+        return entry.bone
+    return next((bone.name for bone in bones if getattr(bone, BONE_NUMBER) == entry.number), entry.bone)
+
+
+def group_of(entry):
+    """The name that a handle's vertex group has now: Blender renames groups with their bones."""
+    if entry.kind != "BONE" or not entry.group or entry.group != entry.bone or not in_scene(entry.rig):
+        return entry.group
+    name = bone_of(entry)
+    return name if name in entry.id_data.vertex_groups else entry.group
+
+
+def follow_rename(entry):
+    """Notes the names that a handle's bone and its vertex group have now."""
+    if entry.kind != "BONE":
+        return
+    if bone_of(entry) != entry.bone:
+        entry.group, entry.bone = group_of(entry), bone_of(entry)
+    if not entry.number:  # of an earlier version's file
+        entry.number = numbered(entry.rig, entry.bone)
+
+
+def numbered(rig, name):
+    """The number of a bone, a new one where it has none or that of another; 0 where that cannot be."""
+    bones, bone = rig.data.bones, rig.data.bones[name]
+    first = next(one for one in bones if getattr(one, BONE_NUMBER) == getattr(bone, BONE_NUMBER))
+    if getattr(bone, BONE_NUMBER) and first == bone:
+        return getattr(bone, BONE_NUMBER)
+    if rig.data.library is not None or rig.data.override_library is not None:
+        return 0
+    setattr(bone, BONE_NUMBER, 1 + max(getattr(one, BONE_NUMBER) for one in bones))
+    return getattr(bone, BONE_NUMBER)
+
+
 def box_now(entry, where=matrix_of):
     """The cube [-1, 1]³ → world, of a handle where it is now."""
     if entry.kind == "BONE":
-        return where(entry.rig, entry.bone) @ bone_box(entry.rig.data.bones[entry.bone])
+        name = bone_of(entry)
+        return where(entry.rig, name) @ bone_box(entry.rig.data.bones[name])
     return current_box(entry.empty, where)
 
 
@@ -41,7 +82,7 @@ def bone_box(bone):
 def has_mover(entry):
     if entry.kind != "BONE":
         return in_scene(entry.empty)
-    return in_scene(entry.rig) and entry.rig.pose is not None and entry.bone in entry.rig.pose.bones
+    return in_scene(entry.rig) and entry.rig.pose is not None and bone_of(entry) in entry.rig.pose.bones
 
 
 def mover_of(entry):
@@ -50,7 +91,7 @@ def mover_of(entry):
 
 
 def name_of(entry):
-    return entry.bone if entry.kind == "BONE" else entry.empty.name
+    return bone_of(entry) if entry.kind == "BONE" else entry.empty.name
 
 
 USER_SETTINGS = ("weight", "hold_from", "reach", "allow_scale")
@@ -68,4 +109,4 @@ def put_user_settings(entry, values):
 
 def key_of(entry):
     """A key of a source's handle. It stays when the handle is renamed, or others are removed."""
-    return mover_of(entry).session_uid, entry.bone
+    return mover_of(entry).session_uid, bone_of(entry) if entry.kind == "BONE" else ""

@@ -54,7 +54,7 @@ def chosen_entries(context, source):
 
 def is_selected(context, entry):
     if entry.kind == "BONE":
-        return entry.rig.mode == "POSE" and bones.is_selected(entry.rig, entry.bone)
+        return entry.rig.mode == "POSE" and bones.is_selected(entry.rig, movers.bone_of(entry))
     return entry.empty in context.selected_objects
 
 

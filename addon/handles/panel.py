@@ -27,7 +27,13 @@ class ARAPFIELDS_UL_handles(bpy.types.UIList):
         swatch.ui_units_x = 0.8
         swatch.prop(item, "colour", text="")
         if item.kind == "BONE":
-            row.prop(item, "bone", text="", emboss=False, icon=ICONS[item.kind])
+            row.prop(
+                item.rig.data.bones[movers.bone_of(item)],
+                "name",
+                text="",
+                emboss=False,
+                icon=ICONS[item.kind],
+            )
         else:
             row.prop(item.empty, "name", text="", emboss=False, icon=ICONS[item.kind])
         if item.kind in empties.PINS:

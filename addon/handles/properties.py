@@ -20,6 +20,7 @@ class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
         poll=is_armature,
     )
     bone: text("Bone", "The bone that moves the handle")
+    number: integer("Bone's Number", "What tells the bone from others when it is renamed; 0 for its name")
     kind: choice(HANDLE_KINDS, "Kind", "What of the surface the handle holds")
     group: text(
         "Vertex Group", "The group that the handle holds; a bone without one holds what lies about it"

@@ -105,7 +105,7 @@ def layout_of(source, kind, scene):
     """
     settings = settings_of(source)
     held = [
-        (movers.key_of(e), e.kind, e.group, tuple(movers.user_settings(e).values()), tuple(e.rest))
+        (movers.key_of(e), e.kind, movers.group_of(e), tuple(movers.user_settings(e).values()), tuple(e.rest))
         for e in empties.used(source)
     ]
     style, stiffness = settings.stylize, settings.stiffness

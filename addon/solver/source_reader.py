@@ -14,7 +14,7 @@ from ..carried.carrying import Carrying, Reshaped
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
-from ..handles import empties
+from ..handles import empties, movers
 from ..surface.source_surface import read_surface
 from . import secondary_motion, style_settings
 from .contact import contact_of
@@ -77,6 +77,8 @@ class SourceReader:
 
     def read_handles(self, source, weights=None):
         """The handles at rest; `weights` are those of the vertex groups, where any of them needs one."""
+        for entry in empties.used(source):
+            movers.follow_rename(entry)
         handles = empties.solve_handles(source, self.surface.space, weights)
         self.handles = [replace(handle, target=handle.rest) for handle in handles]
 
