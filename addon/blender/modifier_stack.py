@@ -138,6 +138,14 @@ def evaluated(context, source, kept):
         depsgraph = updated(context.view_layer)
         yield source.evaluated_get(depsgraph), depsgraph
         return
+    with staged(context, source, kept) as (copied, layer):
+        depsgraph = updated(layer)
+        yield copied.evaluated_get(depsgraph), depsgraph
+
+
+@contextmanager
+def staged(context, source, kept):
+    """(copy, view layer) of the object with these of its modifiers alone, in a scene of its own."""
     stage = bpy.data.scenes.new("ARAP Fields")
     copied = None
     try:
@@ -147,8 +155,7 @@ def evaluated(context, source, kept):
         updated(layer)  # the frame is set before there is anything to animate
         copied = cut_copy(source, {modifier.name for modifier in kept})
         stage.collection.objects.link(copied)
-        depsgraph = updated(layer)
-        yield copied.evaluated_get(depsgraph), depsgraph
+        yield copied, layer
     finally:
         if copied is not None:
             bpy.data.objects.remove(copied)

@@ -16,7 +16,7 @@ from ..core.geometry.handles import Handle
 from ..core.runtime import native
 from ..core.runtime.coroutines import Pause, run_to_completion, step_for
 from ..core.runtime.threads import start_thread
-from . import empties, movers
+from . import empties, movers, subdivided
 from .native_handles import Holding
 
 COUNTED = 4000  # samples of the surface of which a handle's part is told
@@ -41,6 +41,7 @@ def counting(context, source):
     """Coroutine that counts for all handles of a source."""
     in_place = settings_of(source).in_place
     reference, mesh = ObjectReference(source), mesh_arrays.read(context, source, in_place)
+    shown = subdivided.read(context, source, in_place)
     weights = yield from vertex_groups.read_weights(context, source, empties.group_names(source), in_place)
     source = reference.get()
     regions = {movers.key_of(entry): region_of(entry, weights) for entry in empties.used(source)}
@@ -48,7 +49,7 @@ def counting(context, source):
 
     def work():
         try:
-            counts.update(points_inside(mesh, regions))
+            counts.update(points_inside(mesh, regions, shown))
         except ValueError as error:
             failures.append(error)
 
@@ -70,8 +71,10 @@ def region_of(entry, weights):
     return Handle("", entry.kind, rest, rest, weights.get(movers.group_of(entry)), hold_from=entry.hold_from)
 
 
-def points_inside(mesh, regions):
-    """{the handle's key: points that it holds, -1 for a point or a pin}; on the worker."""
+def points_inside(mesh, regions, shown):
+    """{the handle's key: points that it holds, -1 for a point or a pin}; on the worker.
+
+    `shown` is what subdivided.read() gives."""
     if mesh.splats is not None:
         points = mesh.vertices
     else:
@@ -83,7 +86,7 @@ def points_inside(mesh, regions):
         elif handle.kind in ("GROUP", "BONE"):
             counts[key] = len(holding.of(handle))
         else:
-            counts[key] = int(handle.inside(points).sum())
+            counts[key] = len(subdivided.inside(handle, points, shown)[0])
     return counts
 
 

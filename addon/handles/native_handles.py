@@ -3,6 +3,7 @@
 
 from ..blender.vertex_groups import NearestVertices
 from ..core.geometry.handles import far_from, require_held
+from . import subdivided
 
 
 def native_handles(af, handles, rest, samples, reaches=True):
@@ -28,8 +29,10 @@ def native_handles(af, handles, rest, samples, reaches=True):
             held = far_from(handle, samples.points)
             natives += [region(af, handle, held, further)] if len(held) else []
         else:
-            counts[handle.name] = int(handle.inside(samples.points).sum())
-            natives.append(af.Cuboid(handle.rest, handle.target, **further))
+            held, by_box = subdivided.inside(handle, samples.points, rest.shown)
+            counts[handle.name] = len(held)
+            box = af.Cuboid(handle.rest, handle.target, **further)
+            natives.append(box if by_box else region(af, handle, held, further))
     require_held(counts)
     return natives
 

@@ -15,6 +15,7 @@ from ..core.geometry import rotations
 from ..core.geometry.edges import build_edges
 from ..core.geometry.spaces import Space, space_of
 from ..core.runtime import native
+from ..handles import subdivided
 from ..stiffness import painted
 from .surface_fit import SurfaceFit, read_fit
 
@@ -35,6 +36,7 @@ class SourceSurface:
     stiffness: tuple  # (n,) factors of the vertices' stiffness, and of that against bending; None for 1
     solids: list  # (vertices, triangles) of what is sampled with it
     splats: Splats | None = None  # the vertices' own
+    shown: tuple | None = None  # ((m, 3) places on it, (m, 3) where they are seen), where it is subdivided
 
     @cached_property
     def _exact_surface(self):
@@ -158,4 +160,5 @@ def read_surface(context, source, in_place=False, *, exact=None, fit_operator=No
         stiffness=(None, None) if carrying is None else painted.read(context, source, in_place),
         solids=[] if carrying is None else carrying.solids(context, space),
         splats=in_world_shape(mesh.splats, space, source),
+        shown=None if carrying is None else subdivided.read(context, source, in_place, space.to_solve),
     )
