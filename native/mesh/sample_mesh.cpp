@@ -25,8 +25,7 @@ Vec3 corner(const Points& vertices, const Triangles& triangles, Index t, int k) 
 
 /// One or several meshes' triangles, and where they lie in the cube.
 struct Joined {
-  Points vertices;
-  Triangles triangles;
+  TriangleMesh mesh;
   VertexWeights painted;
   Frame frame;
   std::vector<Index> ends;  // of each mesh's triangles; empty for a single mesh
@@ -51,7 +50,7 @@ SurfaceSamples draw_from(Joined joined, Index count, std::uint64_t seed) {
   require_memory("count", 20.0 * sizeof(double) * static_cast<double>(count));
   SurfaceSamples samples;
   samples.frame = joined.frame;
-  const AreaSampler sampler(joined.frame.to_cube(joined.vertices), joined.triangles);
+  const AreaSampler sampler(joined.frame.to_cube(joined.mesh.vertices), joined.mesh.triangles);
   samples.points.resize(count, 3);
   samples.normals.resize(count, 3);
   const bool several = !joined.ends.empty();
@@ -66,14 +65,15 @@ SurfaceSamples draw_from(Joined joined, Index count, std::uint64_t seed) {
       if (!draws.empty()) draws[i] = draw;
     }
   });
-  samples.weights = at_draws(joined.painted.weights, joined.triangles, draws);
-  samples.bend_weights = at_draws(joined.painted.bend_weights, joined.triangles, draws);
+  samples.weights = at_draws(joined.painted.weights, joined.mesh.triangles, draws);
+  samples.bend_weights = at_draws(joined.painted.bend_weights, joined.mesh.triangles, draws);
   for (Index i = 0; i < count && several; ++i) {
     const auto mesh_end = std::upper_bound(joined.ends.begin(), joined.ends.end(), draws[i].triangle);
     samples.mesh_indices.push_back(static_cast<std::int32_t>(mesh_end - joined.ends.begin()));
   }
-  samples.redraw = [kept = std::make_shared<const Joined>(std::move(joined))](
-                       Index again, std::uint64_t other) { return draw_from(*kept, again, other); };
+  const auto kept = std::make_shared<const Joined>(std::move(joined));
+  samples.mesh = {kept, &kept->mesh};
+  samples.redraw = [kept](Index again, std::uint64_t other) { return draw_from(*kept, again, other); };
   return samples;
 }
 
@@ -166,7 +166,7 @@ SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count
                            const VertexWeights& painted) {
   require_weights("weights", painted.weights, vertices.rows());
   require_weights("bend_weights", painted.bend_weights, vertices.rows());
-  return draw_from({vertices, triangles, painted, area_frame(vertices, triangles), {}}, count, seed);
+  return draw_from({{vertices, triangles}, painted, area_frame(vertices, triangles), {}}, count, seed);
 }
 
 SurfaceSamples sample_meshes(const std::vector<TriangleMesh>& meshes, Index count, std::uint64_t seed,
@@ -194,14 +194,14 @@ SurfaceSamples sample_meshes(const std::vector<TriangleMesh>& meshes, Index coun
   }
   require(vertices <= INT32_MAX && triangles <= INT32_MAX, "meshes", "too many vertices or triangles in all",
           "32-bit indices reach no farther");
-  all.vertices.resize(vertices, 3);
-  all.triangles.resize(triangles, 3);
+  all.mesh.vertices.resize(vertices, 3);
+  all.mesh.triangles.resize(triangles, 3);
   all.painted = {Vector::Ones(painted.empty() ? 0 : vertices), Vector::Ones(painted.empty() ? 0 : vertices)};
   Index v = 0, t = 0;
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     const TriangleMesh& mesh = meshes[i];
-    all.vertices.middleRows(v, mesh.vertices.rows()) = mesh.vertices;
-    all.triangles.middleRows(t, mesh.triangles.rows()) = mesh.triangles.array() + static_cast<int>(v);
+    all.mesh.vertices.middleRows(v, mesh.vertices.rows()) = mesh.vertices;
+    all.mesh.triangles.middleRows(t, mesh.triangles.rows()) = mesh.triangles.array() + static_cast<int>(v);
     if (!painted.empty()) {
       if (painted[i].weights.size() > 0)
         all.painted.weights.segment(v, mesh.vertices.rows()) = painted[i].weights;

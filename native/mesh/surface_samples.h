@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "core/frame.h"
 #include "core/types.h"
+#include "mesh/triangle_mesh.h"
 
 namespace arapfields {
 
@@ -18,9 +20,10 @@ struct SurfaceSamples {
   /// Draws `count` other samples of the same surface, in the same frame; empty where the surface is not
   /// known.
   std::function<SurfaceSamples(Index count, std::uint64_t seed)> redraw;
-  Vector weights = {};                          ///< (n; empty: all 1) ≥ 0, factors of the samples' energies
-  Vector bend_weights = {};                     ///< (n; empty: all 1) ≥ 0, factors of the bending in them
-  std::vector<std::int32_t> mesh_indices = {};  ///< (n; empty: all 0) which of several meshes each lies on
+  Vector weights = {};                            ///< (n; empty: all 1) ≥ 0, factors of the samples' energies
+  Vector bend_weights = {};                       ///< (n; empty: all 1) ≥ 0, factors of the bending in them
+  std::vector<std::int32_t> mesh_indices = {};    ///< (n; empty: all 0) which of several meshes each lies on
+  std::shared_ptr<const TriangleMesh> mesh = {};  ///< that they lie on, in mesh coordinates; null: not known
   Index size() const { return points.rows(); }
 };
 

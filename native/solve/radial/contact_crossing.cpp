@@ -108,6 +108,9 @@ void ContactWays::cross(Index surface, const BarrierSurface& obstacle, const Con
     samples[static_cast<std::size_t>(row)] = true;
     if (clear(row, surface) < 0.0) clear(row, surface) = left_inside;
   }
+  for (Index row = count; row < clear.rows(); ++row)
+    if (clear(row, surface) < 0.0 && crosses(surface, points.sample_of(row)))
+      clear(row, surface) = left_inside;
 }
 
 std::vector<Index> ContactWays::crossing() const {

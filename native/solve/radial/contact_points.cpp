@@ -4,18 +4,25 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "core/decompositions.h"
 #include "core/jacobians.h"
 #include "core/random.h"
 #include "core/unit_rows.h"
+#include "sampling/oriented_points.h"
 #include "sampling/sample_choice.h"
+#include "sampling/standing_out.h"
 
 namespace arapfields {
 namespace {
 
 /// Samples that are followed at most; they lie denser than any detail of a radial field.
 constexpr Index most_samples = 20000;
+/// Vertices of the mesh that stand farther out of the samples, in cube units, are followed, so many at most:
+/// less is within the distance that contact keeps.
+constexpr double stands_out = 1e-3;
+constexpr Index most_vertices = 4000;
 /// Finer places at most: of the edges that touch, more would say nothing new.
 constexpr Index most_finer = 12000;
 /// Finer places lie so many times as dense, and a sample stands for places up to so many spacings away.
@@ -34,12 +41,29 @@ void ContactPoints::choose() {
   Random random(static_cast<std::uint64_t>(problem_.options.seed), 3);
   samples_ = stratified(problem_.shape->order, std::min(most_samples, problem_.samples.size()), random);
   rest_ = rows_of(problem_.surface(), samples_);
-  embedded_ = embedded_at(rest_);
   const double wide = 0.05;  // a cell holds about a square of the surface
   const PointGrid coarse(rest_, wide);
   spacing_ = wide * std::sqrt(static_cast<double>(coarse.size()) / static_cast<double>(rest_.rows()));
   near_.resize(samples_.size());
   is_fine_.assign(samples_.size(), false);
+  add_vertices();
+  embedded_ = embedded_at(rest_);
+  coarse_ = rest_.rows();
+}
+
+void ContactPoints::add_vertices() {
+  if (!problem_.samples.mesh) return;
+  const TriangleMesh& mesh = *problem_.samples.mesh;
+  std::vector<Index> rows(samples_.size());
+  std::iota(rows.begin(), rows.end(), Index{0});
+  const Points vertices = problem_.frame().to_cube(used_vertices(mesh.vertices, mesh.triangles));
+  const Points found =
+      rows_of(vertices, standing_out(vertices, rest_, normals(rows), spacing_, stands_out, most_vertices));
+  const Points alike = Points::Zero(std::max(rest_.rows(), found.rows()), 3);
+  parents_ =
+      OrientedPoints(rest_, alike.topRows(rest_.rows())).nearest(found, alike.topRows(found.rows()), 0.0);
+  rest_.conservativeResize(rest_.rows() + found.rows(), Eigen::NoChange);
+  rest_.bottomRows(found.rows()) = found;
 }
 
 Index ContactPoints::sample_of(Index row) const {
@@ -48,7 +72,7 @@ Index ContactPoints::sample_of(Index row) const {
 
 double ContactPoints::share(Index row) const {
   const double whole = 1.0 / static_cast<double>(sample_count());
-  return row < sample_count() ? whole : 0.5 * whole;
+  return row < coarse_ ? whole : 0.5 * whole;
 }
 
 Points ContactPoints::rest(const std::vector<Index>& rows) const { return rows_of(rest_, rows); }
@@ -155,7 +179,7 @@ void ContactPoints::refine(const std::vector<Index>& samples) {
   if (problem_.samples.normals.rows() != problem_.samples.size()) return;
   const Index known = rest_.rows();
   for (const Index sample : samples) {
-    if (is_fine_[static_cast<std::size_t>(sample)] || std::ssize(parents_) > most_finer) continue;
+    if (is_fine_[static_cast<std::size_t>(sample)] || size() - coarse_ > most_finer) continue;
     is_fine_[static_cast<std::size_t>(sample)] = true;
     const Points more = finer(sample);
     ++finer_places_;
@@ -172,16 +196,16 @@ void ContactPoints::refine(const std::vector<Index>& samples) {
 
 void ContactPoints::coarsen() {
   if (std::find(is_fine_.begin(), is_fine_.end(), true) == is_fine_.end()) return;
-  parents_.clear();
+  parents_.resize(static_cast<std::size_t>(coarse_ - sample_count()));
   ++finer_places_;
   is_fine_.assign(samples_.size(), false);
-  rest_.conservativeResize(sample_count(), Eigen::NoChange);
-  if (embedded_.rows() > 0) embedded_.conservativeResize(sample_count(), Eigen::NoChange);
-  places_.conservativeResize(std::min(places_.rows(), sample_count()), Eigen::NoChange);
+  rest_.conservativeResize(coarse_, Eigen::NoChange);
+  if (embedded_.rows() > 0) embedded_.conservativeResize(coarse_, Eigen::NoChange);
+  places_.conservativeResize(std::min(places_.rows(), coarse_), Eigen::NoChange);
 }
 
 const Points& ContactPoints::at(const RowMatrix<double>& coefficients) {
-  const Index n = sample_count(), all = size();
+  const Index n = coarse_, all = size();
   if (!is_at(coefficients)) places_.resize(0, 3);
   coefficients_ = coefficients;
   const Index known = places_.rows();

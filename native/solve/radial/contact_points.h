@@ -10,8 +10,8 @@
 
 namespace arapfields {
 
-/// The places of a surface that are followed: samples, and finer places around those that meet an edge, which
-/// would poke through between them.
+/// The places of a surface that are followed: samples, vertices of its mesh that stand out of them, and finer
+/// places around samples that meet an edge, which would poke through between them.
 class ContactPoints {
  public:
   explicit ContactPoints(const RadialProblem& problem) : problem_(problem) {}
@@ -20,9 +20,11 @@ class ContactPoints {
   bool empty() const { return samples_.empty(); }
   /// Rows of the problem's samples that are followed.
   const std::vector<Index>& samples() const { return samples_; }
-  /// Of samples and finer places, in this order.
+  /// Of samples, vertices and finer places, in this order.
   Index size() const { return rest_.rows(); }
   Index sample_count() const { return static_cast<Index>(samples_.size()); }
+  /// All but finer places.
+  Index coarse_count() const { return coarse_; }
   /// The sample that a place belongs to.
   Index sample_of(Index row) const;
   /// The area that a place stands for, as a share of the whole.
@@ -38,7 +40,7 @@ class ContactPoints {
   const std::vector<Index>& neighbours(Index sample);
   /// Adds finer places around samples that have none yet.
   void refine(const std::vector<Index>& samples);
-  /// The samples alone.
+  /// No finer places.
   void coarsen();
 
   const Points& at(const RowMatrix<double>& coefficients);
@@ -51,13 +53,15 @@ class ContactPoints {
   Points normals_at(const RowMatrix<double>& coefficients, const std::vector<Index>* blocks = nullptr);
 
  private:
+  void add_vertices();
   Points finer(Index sample);
   Points embedded_at(PointsIn places) const;
 
   const RadialProblem& problem_;
   std::vector<Index> samples_;
-  std::vector<Index> parents_;  // of the finer places
-  std::vector<bool> is_fine_;   // samples
+  std::vector<Index> parents_;  // of what is no sample
+  Index coarse_ = 0;
+  std::vector<bool> is_fine_;  // samples
   Points rest_;
   Points embedded_;  // rest_
   double spacing_ = 0.0;

@@ -73,7 +73,7 @@ void ContactTerms::see(Index k) {
 ContactState ContactTerms::held() const {
   ContactState state;
   for (const BarrierSurface& surface : surfaces_) state.placements.push_back(surface.placement());
-  for (Index row = 0; row < std::min<Index>(pressures_.rows(), points_.sample_count()); ++row)
+  for (Index row = 0; row < std::min<Index>(pressures_.rows(), points_.coarse_count()); ++row)
     for (Index k = 0; k < pressures_.cols(); ++k)
       if (pressures_(row, k) > 0.0) {
         const Points& of =
@@ -81,7 +81,7 @@ ContactState ContactTerms::held() const {
         state.pressures.push_back({row, k, pressures_(row, k), of.row(row).transpose()});
       }
   state.crossed = ways_.crossed;
-  const Points places = places_.topRows(std::min<Index>(places_.rows(), points_.sample_count()));
+  const Points places = places_.topRows(std::min<Index>(places_.rows(), points_.coarse_count()));
   for (Index k = 0; k < std::ssize(surfaces_); ++k)
     note_inside(k, places, ways_.seen[static_cast<std::size_t>(k)], ways_.clear.col(k), state);
   return state;
