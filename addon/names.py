@@ -20,6 +20,7 @@ TURNS = "ARAP Fields Turns"  # and how free custom normals turn: axis · angle
 CHANGES = "ARAP Fields: "  # how names of attributes begin that say what is added to one of a splat
 CACHE_MODIFIER = "ARAP Fields Cache"  # Blender's Mesh Cache modifier that plays a bake
 FIELD_GROUP = "arapfields_group"  # custom property of that modifier's node groups: which, and its version
+LAYER_GROUP = "arapfields_layer"  # of node groups of results below: version, kind, number, normals
 FIELD_NODES = "arapfields_nodes"  # custom property of the node group that evaluates a field: its version
 RESULT_SUFFIX = {
     "DEFORM": "_deformed",

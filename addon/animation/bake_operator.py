@@ -5,10 +5,11 @@ import contextlib
 
 from ..blender.host import has_window
 from ..blender.language import translated
-from ..blender.object_references import settings_of
+from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import effective_value, flag
 from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError
+from ..field_modifier import layers
 from ..handles import empties
 from ..jobs.job_operator import JobOperator, with_progress
 from ..solver import style_settings
@@ -32,6 +33,7 @@ class BakeOperator(JobOperator):
         return refusal_of(source, effective_kind(source))
 
     frames_pass = None  # BakePass, where frames are solved
+    covered = ()  # ObjectReferences of sources whose earlier results became layers
     used = SETTINGS
 
     def invoke(self, context, event):
@@ -57,6 +59,8 @@ class BakeOperator(JobOperator):
             yield from self.frames_pass.play(context, job)
 
     def clear_up(self, job):
+        for source in filter(None, (reference.find() for reference in self.covered)):
+            layers.uncover(source)  # where no cache plays over it
         if self.frames_pass is not None:
             self.frames_pass.feed.close()
             job.cancel()
@@ -81,12 +85,15 @@ class BakeOperator(JobOperator):
     def begin(self, context, job, sources, values, bakes_of):
         """Coroutine: reads the sources, (object, kind), each made an ObjectBake by `bakes_of(source, kind,
         frames)`; the job's items."""
-        chosen, bakes = self.choose(context, sources, values), []
+        chosen, bakes, self.covered = self.choose(context, sources, values), [], []
         for source, kind in sources:
             reason = refusal_of(source, kind)
             try:
                 if reason is not None:
                     raise reason
+                if kind == "DEFORM":
+                    layers.make_way(source, kind)
+                    self.covered.append(ObjectReference(source))
                 bake = bakes_of(source, kind, chosen)
                 yield from with_progress(job, bake.reader.read_setup(context), source.name)
                 bakes.append(bake)

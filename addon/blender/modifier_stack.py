@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import bpy
 
 from ..core.errors import UserError
-from ..names import FIELD_GROUP
+from ..names import FIELD_GROUP, LAYER_GROUP
 from .evaluation import updated
 from .object_references import settings_of
 from .removal import remove_modifier
@@ -46,6 +46,20 @@ def is_cache(modifier):
 
 def is_field(modifier):
     return modifier.type == "NODES" and modifier.node_group is not None and FIELD_GROUP in modifier.node_group
+
+
+def layers(source):
+    """The modifiers of results below the field's, the first one first."""
+    return [modifier for modifier in source.modifiers if is_layer(modifier)]
+
+
+def is_layer(modifier):
+    return modifier.type == "NODES" and modifier.node_group is not None and LAYER_GROUP in modifier.node_group
+
+
+def top(source):
+    """The object's field modifier, or where there is none its last layer, or None."""
+    return find(source) or next(reversed(layers(source)), None)
 
 
 def place(source):
@@ -121,7 +135,7 @@ def shown_before(source, in_place):
 def keeps_vertices(source):
     """Whether the vertices at the field's place are those of the mesh, by number, shown and rendered."""
     return all(
-        modifier.type in KEEPING
+        modifier.type in KEEPING or is_layer(modifier)
         for modifier in before(source, in_place=True)
         if modifier.show_viewport or modifier.show_render
     )

@@ -7,7 +7,7 @@ from ..core.settings.parameters import DEFORM
 from ..handles import empties
 from ..live.panel import live_buttons, playback_progress
 from ..names import Op
-from ..results.placement import placement_refusal
+from ..results.placement import placement_refusal, replaced_by
 
 
 class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
@@ -23,7 +23,9 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
         job_button(layout, Op.DEFORM, "MOD_SIMPLEDEFORM")
         settings_column(layout, settings.deform, DEFORM, advanced=False)
         playback_progress(layout, source, "DEFORM")
-        note(layout, empties.require_handles(source), placement_refusal(source))
+        note(
+            layout, empties.require_handles(source), placement_refusal(source), replaced_by(source, "DEFORM")
+        )
         if empties.holding_nothing(source):
             note(layout, nothing_held(empties.holding_nothing(source)))
 

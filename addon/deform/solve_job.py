@@ -9,7 +9,7 @@ import numpy as np
 from ..blender.evaluation import depsgraph_of
 from ..blender.host import has_window
 from ..blender.language import translated
-from ..blender.object_references import settings_of
+from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import effective_value
 from ..carried.carrying import Carrying
 from ..core.errors import UserError
@@ -17,6 +17,7 @@ from ..core.geometry.spaces import inverse, similarity, transform
 from ..core.poses import Pose
 from ..core.runtime import native
 from ..core.runtime.jobs import Item
+from ..field_modifier import layers
 from ..jobs.job_operator import JobOperator
 from ..live.sessions import end_for_job
 from ..poses import applying
@@ -37,7 +38,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
     reason = placement.refusal(source, output, result)
     if reason is not None:
         raise reason
-    operator.end_live(context, source)
+    operator.end_live(context, source, kind)
     exact = effective_value("surface", settings, operator) == "EXACT"
     extraction = {name: effective_value(name, settings, operator) for name in ("resolution", "refine_thin")}
     carrying, in_place = Carrying(context, source), placement.in_place(output, result)
@@ -83,6 +84,8 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
         if preview is not None:
             preview.clear()
         owner = surface.reference.get()
+        if result != "NEW":
+            operator.gone = tuple(one for one in operator.gone if one[0].uid != surface.reference.uid)
         item = placement.place_result(bpy.context, owner, kind, output, result, solved, surface.local)
         if solved.place is not None:
             placement.move(bpy.context, item, solved.place)
@@ -101,6 +104,8 @@ class SolveOperator(JobOperator):
 
     ended_live = False  # whether live mode gave way to it
 
+    gone = ()  # (ObjectReference, what make_way() has taken away) of sources that have no result yet
+
     @classmethod
     def refuses(cls, source):
         """Checked before the button is pressed; a script's own arguments are checked when it calls."""
@@ -110,9 +115,22 @@ class SolveOperator(JobOperator):
         if self.ended_live:
             bpy.ops.ed.undo_push(message="Live")
 
-    def end_live(self, context, source):
-        """For when nothing is refused any more."""
-        self.ended_live |= end_for_job(context, source, *destination(settings_of(source), self))
+    def end_live(self, context, source, kind):
+        """For when nothing is refused any more; what such a run acts on becomes a layer."""
+        output, result = destination(settings_of(source), self)
+        self.ended_live |= end_for_job(context, source, output, result)
+        if any(reference.uid == source.session_uid for reference, _ in self.gone):
+            return
+        reason = None if result == "NEW" else layers.replaced(source, kind)
+        self.warnings += [translated(reason)] if reason else []
+        self.gone = (*self.gone, (ObjectReference(source), layers.make_way(source, kind)))
+
+    def clear_up(self, job):
+        """Where nothing came of it, the results before lie as they did."""
+        for reference, gone in self.gone:
+            source = reference.find()
+            if source is not None:
+                layers.put_back(bpy.context, source, gone)
 
     def in_place(self, source):
         return placement.in_place(*destination(settings_of(source), self))

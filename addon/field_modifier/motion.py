@@ -84,8 +84,12 @@ def add(source, normals, splats):
 
 
 def choose_group(modifier, normals, splats):
-    """Exchanges the node group where the normals ask for another; what the user set stays."""
-    group = node_group.find_or_make(normals, splats)
+    """Exchanges the node group where the normals ask for another."""
+    take_group(modifier, node_group.find_or_make(normals, splats))
+
+
+def take_group(modifier, group):
+    """Gives a modifier of ours another node group; what the user set stays."""
     if modifier.node_group == group:
         return
     factor, mask = inputs.get(modifier, "Factor"), inputs.get(modifier, "Mask")
@@ -152,8 +156,9 @@ def write(source, motion):
     write_to(mesh, motion)
 
 
-def write_to(mesh, motion):
-    for name, vectors in ((OFFSETS, motion.offsets), (TURNS, motion.turns)):
+def write_to(mesh, motion, number=""):
+    """`number`: of the layer whose motion it is."""
+    for name, vectors in zip(node_group.names_of(number), (motion.offsets, motion.turns), strict=True):
         attribute = mesh.attributes.get(name)
         if vectors is None:
             if attribute is not None:
@@ -169,8 +174,9 @@ def write_to(mesh, motion):
     mesh.update_tag()
 
 
-def read_from(mesh):
-    return Motion(*(vectors(mesh, name) for name in (OFFSETS, TURNS)), splat_layouts.changes_of(mesh))
+def read_from(mesh, number=""):
+    moved = (vectors(mesh, name) for name in node_group.names_of(number))
+    return Motion(*moved, splat_layouts.changes_of(mesh))
 
 
 def shown_points(source):
@@ -221,5 +227,7 @@ def discard(source):
             discard_helper(helper)
     if settings_of(source).under_rig:  # a write counts as a change of the object
         settings_of(source).under_rig = False
+    if settings_of(source).moved_by:
+        settings_of(source).moved_by = ""
     if source.data.library is None and source.data.users == 1:
         write_to(source.data, Motion(None))

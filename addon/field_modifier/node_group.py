@@ -10,7 +10,7 @@ nearest place of the helper's surface instead.
 import bpy
 
 from ..blender.modifier_stack import FREE_NORMALS
-from ..names import CHANGES, FIELD_GROUP, FIELD_MODIFIER, OFFSETS, TURNS
+from ..names import CHANGES, FIELD_GROUP, FIELD_MODIFIER, LAYER_GROUP, OFFSETS, TURNS
 
 VERSION = 1
 VECTORS = {"data_type": "FLOAT_VECTOR", "domain": "POINT"}  # of nodes that sample points
@@ -30,6 +30,22 @@ def find_or_make(normals=PLAIN, splats=None):
     return kept_group(FIELD_GROUP, mark, lambda: build(name, normals, splats or {}))
 
 
+def find_or_make_layer(kind, number, normals=PLAIN):
+    """The same for a layer, whose motion has names of its own."""
+    name, mark = f"{FIELD_MODIFIER} {kind.title()}", f"{VERSION} {kind} {number} {normals}"
+    return kept_group(LAYER_GROUP, mark, lambda: build(name, normals, {}, number))
+
+
+def normals_of(modifier):
+    """Domain of the free custom normals that a field's modifier turns, or ""."""
+    return "".join(modifier.node_group[FIELD_GROUP].split()[1:])
+
+
+def names_of(number=""):
+    """The attributes of a motion: offsets, turns; of a layer with its number."""
+    return (f"{OFFSETS} {number}".rstrip(), f"{TURNS} {number}".rstrip())
+
+
 def kept_group(key, mark, build):
     """The file's own group with this mark under its custom property `key`; built where there is none."""
     for group in list(bpy.data.node_groups):
@@ -40,8 +56,8 @@ def kept_group(key, mark, build):
     return group
 
 
-def build(name, normals, splats):
-    graph = Graph(name)
+def build(name, normals, splats, number=""):
+    graph, (offsets, turns) = Graph(name), names_of(number)
     graph.fading_inputs("How far each point goes; takes a vertex group")
     helper = graph.socket("Offsets", "INPUT", "NodeSocketObject", "Mesh that carries the offsets, if any")
     helper.hide_in_modifier = True
@@ -50,11 +66,11 @@ def build(name, normals, splats):
     inputs = graph.node("NodeGroupInput").outputs
     source = AttributeSource(graph, inputs["Geometry"], inputs["Offsets"])
     strength = graph.node("ShaderNodeMath", inputs["Factor"], inputs["Mask"], operation="MULTIPLY").outputs[0]
-    vector = source.vectors(OFFSETS)
+    vector = source.vectors(offsets)
     offset = graph.node("ShaderNodeVectorMath", into={"Vector": vector, "Scale": strength}, operation="SCALE")
     result = graph.set_position(inputs["Geometry"], graph.acts(strength), offset.outputs[0])
     if normals:
-        result = turn_normals(graph, result, source.vectors(TURNS), strength, normals)
+        result = turn_normals(graph, result, source.vectors(turns), strength, normals)
     for attribute, kind in splats.items():
         result = add_change(graph, result, attribute, kind, strength)
     graph.node("NodeGroupOutput", result)

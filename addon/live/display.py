@@ -13,6 +13,7 @@ class Former(NamedTuple):
     display: Any
     carried: dict  # what carried objects had before
     keeps_shape: bool
+    gone: list  # what layers.make_way() has taken away
 
 
 def display_of(context, source, surface, earlier):

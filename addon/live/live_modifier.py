@@ -19,6 +19,7 @@ class LiveModifier:
 
     def __init__(self, context, source, _):
         self.before, self.shown = motion.snapshot(source), None
+        self.moved_by = settings_of(source).moved_by  # of the motion before
         self.first = self.before  # where a step before this one is undone to
         self.was_silent = bool(settings_of(source).silenced)
         self.was_playing = cache_modifier.is_playing(source)
@@ -54,6 +55,8 @@ class LiveModifier:
             visibility.give_back(source)
             if source.mode != "EDIT":
                 motion.restore(source, self.before)
+                if self.before is not None:
+                    settings_of(source).moved_by = self.moved_by
                 if not self.was_silent:
                     armatures.restore(source)
                 if self.was_playing:

@@ -9,6 +9,7 @@ from ..blender.object_references import settings_of, source_of
 from ..blender.section import Section, draw_settings, group_row, note, settings_column, switched
 from ..names import Op
 from ..solver import secondary_motion
+from ..solver.frame_range import scene_range
 from . import sessions
 from .properties import SECONDARY
 
@@ -26,10 +27,20 @@ def live_buttons(layout, source, kind, refusal):
         row.operator(Op.LIVE_KEEP, icon="CHECKMARK")
 
 
+def solved_frames(source, scene):
+    """(how many of the scene's frames live mode has solved, how many there are); None where none is."""
+    session = sessions.live.get(source.session_uid)
+    frames = None if session is None else session.playback.frames
+    if frames is None:
+        return None
+    first, last = scene_range(scene)
+    return frames.count(first, last), last - first + 1
+
+
 def playback_progress(layout, source, kind):
     """How many of the scene's frames are solved already."""
     on = sessions.is_live(source, kind)
-    solved = sessions.solved_frames(source, bpy.context.scene) if on else None
+    solved = solved_frames(source, bpy.context.scene) if on else None
     if solved is not None:
         count, total = solved
         text = translated("{count} of {total} frames solved", count=count, total=total)

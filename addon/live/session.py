@@ -12,7 +12,7 @@ from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..core.runtime.coroutines import run_to_completion, step_for
 from ..core.runtime.latest_request_worker import REST, LatestRequestWorker
-from ..field_modifier import motion
+from ..field_modifier import layers, motion
 from ..results import placement, visibility
 from ..solver import secondary_motion, style_settings
 from ..solver.frame_range import animation_range
@@ -32,16 +32,16 @@ class Session:
     """Reads its source when made, on the main thread; everything that takes time is done by the worker.
 
     What is shown of an `earlier` session of the source, a Former, is used again. `keeps_shape`: what it shows
-    is the user's work, which stays at the end.
+    is the user's work, which stays at the end. `gone`: what layers.make_way() has taken away for it.
 
     Where the shape that the file has is that of the request at hand (stored.py), as after an undone step, it
     stays bit for bit. Where not, it was stored on its way, or too early: the request's own shape is shown.
     """
 
-    def __init__(self, context, source, kind="DEFORM", earlier=None, keeps_shape=False):
+    def __init__(self, context, source, kind="DEFORM", earlier=None, keeps_shape=False, gone=()):
         settings = settings_of(source)
         in_place = placement.in_place(settings.output, settings.result)
-        self.keeps_shape, self.layout = keeps_shape, layout_of(source, kind, context.scene)
+        self.keeps_shape, self.gone, self.layout = keeps_shape, gone, layout_of(source, kind, context.scene)
         self.reader = SourceReader(context, source, kind, in_place)
         self.edits, self.solver, self.worker = EditWatch(self.reader), LiveSolver(self.reader), None
         is_still = keeps_shape or animation_range(source, kind) is None
@@ -61,7 +61,6 @@ class Session:
 
     @property
     def source(self):
-        """ObjectReference of the source."""
         return self.reader.reference
 
     @property
@@ -107,7 +106,7 @@ class Session:
 
     @property
     def former(self):
-        return Former(self.display, self.carrying.before, self.keeps_shape)
+        return Former(self.display, self.carrying.before, self.keeps_shape, self.gone)
 
     def stop(self):
         self._reading.close()
@@ -247,3 +246,5 @@ class Session:
             visibility.forget(source)
         self.display.take_away(source)
         self.carrying.take_away()
+        if source is not None:
+            layers.put_back(bpy.context, source, self.gone)

@@ -10,15 +10,15 @@ import contextlib
 
 import bpy
 
-from ..blender import timers
+from ..blender import modifier_stack, timers
 from ..blender.language import translated
 from ..blender.object_references import in_scene, settings_of
 from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.runtime import jobs
+from ..field_modifier import layers
 from ..results import placement
-from ..solver.frame_range import scene_range
-from ..solver.source_reader import SourceChanged
+from ..solver.source_reader import SourceChanged, uses_handles
 from .edits import Updates
 from .session import Session
 from .stored import Kept
@@ -69,20 +69,52 @@ def begin(context, source, kind="DEFORM", keeps_shape=False):
 
     `keeps_shape`: what is shown stays when live mode ends.
     """
+    end_for_kind(context, source, kind)
     earlier, session = live.part_with(source.session_uid), None
     former = live.returning.pop(source.session_uid, None) if earlier is None else earlier.former
     if former is None or settings_of(source).live_kind != kind:
         settings_of(source).held = ""
+    gone = layers.make_way(source, kind) if former is None else former.gone
     try:
-        session = Session(context, source, kind, former, keeps_shape)
+        session = Session(context, source, kind, former, keeps_shape, gone)
         session.advance()  # a small mesh is read at once
         warn(session)
     except UserError:
         if session or earlier:
             take_away(session or earlier)
+        else:
+            layers.put_back(context, source, gone)
         raise
+    if session.display.in_place:
+        layers.note(source, kind)
     live[source.session_uid] = session
     timers.start(poll_live, persistent=True)
+
+
+def end_for_kind(context, source, kind):
+    """Ends live mode before a session of another kind where one of both acts on what the other has made;
+    returns (Former, kind) of what has ended, or None."""
+    session = live.get(source.session_uid)
+    if session is None or session.kind == kind or not session.display.in_place:
+        return None
+    stays = layers.stays_below(source, kind) and settings_of(source).result == "MODIFIER"
+    if not stays and not modifier_stack.layers(source):
+        return None
+    former = session.former
+    end(context, source, keep=stays)
+    return former, session.kind
+
+
+def go_back(context, source, former, kind):
+    """Makes the source live again as it was before end_for_kind()."""
+    live.returning[source.session_uid] = former
+    begin(context, source, kind, former.keeps_shape)
+
+
+def follows_handles(source):
+    """Whether the source is live, and its shape follows handles."""
+    session = live.get(source.session_uid)
+    return session is not None and uses_handles(settings_of(source), session.kind)
 
 
 def end(context, source, keep=False):
@@ -214,13 +246,3 @@ def poll_live():
                 frames.has_news = False
                 redraw(bpy.context, "UI")
     return INTERVAL
-
-
-def solved_frames(source, scene):
-    """(how many of the scene's frames live mode has solved, how many there are); None where none is."""
-    session = live.get(source.session_uid)
-    frames = None if session is None else session.playback.frames
-    if frames is None:
-        return None
-    first, last = scene_range(scene)
-    return frames.count(first, last), last - first + 1

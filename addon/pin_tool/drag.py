@@ -4,8 +4,10 @@
 from mathutils import Matrix, Vector
 
 from ..blender import modifier_stack
+from ..blender.language import translated
 from ..blender.object_references import ObjectReference, settings_of
-from ..field_modifier import motion
+from ..core.runtime import jobs
+from ..field_modifier import layers, motion
 from ..live import sessions, stored
 from . import pins
 
@@ -16,7 +18,8 @@ TRANSFORMS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axi
 class Snapshot:
     """What a drag changes, as it was: begun before the pin is placed."""
 
-    def __init__(self, context, source):
+    def __init__(self, context, source, ended=None):
+        self.ended = ended  # as make_way() gives it
         settings, layer = settings_of(source), context.view_layer
         self.source, session = ObjectReference(source), sessions.live.get(source.session_uid)
         self.live = None if session is None else (session.kind, session.keeps_shape)
@@ -60,8 +63,8 @@ class Drag:
         self.reach, self.kind = pins.entry_of(empty).reach, pins.entry_of(empty).kind
         self.values = {name: tuple(getattr(empty, name)) for name in TRANSFORMS}
         source = before.source.get()
-        if not sessions.is_live(source, "DEFORM"):
-            sessions.begin(context, source, keeps_shape=True)
+        if not sessions.follows_handles(source):
+            sessions.begin(context, source, kind_of(source), keeps_shape=True)
         sessions.live[source.session_uid].keeps_shape = True
 
     def move(self, context, location):
@@ -135,6 +138,8 @@ class Drag:
         elif session is not None:
             session.keeps_shape = False
             sessions.end(context, source)
+        if self.before.ended is not None:
+            sessions.go_back(context, source, *self.before.ended)
 
 
 def insert_keys(context, empty):
@@ -145,21 +150,42 @@ def insert_keys(context, empty):
             empty.keyframe_insert(path)
 
 
+def kind_of(source):
+    """What a drag makes a source live as: where its style holds handles, the style goes on."""
+    posed = settings_of(source).moved_by == layers.POSED and settings_of(source).stylize.use_handles
+    return "STYLIZE" if posed else "DEFORM"
+
+
+def make_way(context, source):
+    """Before a drag: it acts on the shape that is seen. Returns what live mode gave way to it, or None."""
+    ended = None
+    if not sessions.follows_handles(source):
+        ended = sessions.end_for_kind(context, source, kind_of(source))
+        reason = layers.replaced(source, kind_of(source))
+        if reason is not None:
+            jobs.add_message("WARNING", translated(reason))
+        layers.make_way(source, kind_of(source))
+    return ended
+
+
 def of_entry(context, source, entry):
     """A drag of an existing handle."""
-    before = Snapshot(context, source)
+    ended = make_way(context, source)
+    before = Snapshot(context, source, ended)
     pins.select(context, entry.empty)
     return Drag(context, before, entry.empty)
 
 
 def of_new_pin(context, source, location, radius, **further):
     """A drag of a new pin."""
-    before = Snapshot(context, source)
+    ended = make_way(context, source)
+    before = Snapshot(context, source, ended)
     entry = pins.place(context, source, location, radius, **further)
     try:
         return Drag(context, before, entry.empty, is_new=True)
     except Exception:
         pins.discard(source, entry.empty)
         settings_of(source).keep_rest = before.keep_rest
+        layers.uncover(source)
         before.restore_selection(context)
         raise

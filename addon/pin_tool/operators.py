@@ -169,8 +169,8 @@ class ARAPFIELDS_OT_pin_turn(PinOperator, bpy.types.Operator):
             return {"PASS_THROUGH"}
         source = owner_of(empty)
         try:
-            if not sessions.is_live(source, "DEFORM"):
-                sessions.begin(context, source, keeps_shape=True)
+            if not sessions.follows_handles(source):
+                sessions.begin(context, source, drag.kind_of(source), keeps_shape=True)
         except (UserError, ValueError) as error:
             return self.refuse(error)
         sessions.live[source.session_uid].keeps_shape = True

@@ -12,7 +12,7 @@ from ..carried import carried_objects
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix
 from ..core.geometry.spaces import inverse
-from ..field_modifier import motion
+from ..field_modifier import layers, motion
 from ..handles import empties, naming
 from ..live import sessions
 from ..results import placement
@@ -89,6 +89,7 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
     error = refusal(source)
     if error is not None:
         raise error
+    layers.make_way(source, "DEFORM")
     settings, is_first = settings_of(source), not empties.used(source)
     place = places.find(context, source, location, radius, face, face_count)
     if is_first:
@@ -160,6 +161,7 @@ def remove(context, source, empty):
     settings_of(source).hold_far = settings_of(source).keep_rest = False
     sessions.end(context, source)
     motion.remove(source)
+    layers.uncover(source)
     carried_objects.give_back_all(source)
     source.select_set(True)
     context.view_layer.objects.active = source

@@ -15,7 +15,7 @@ from ..core.geometry import rotations
 from ..core.geometry.spaces import Space
 from ..core.poses import Pose
 from ..core.runtime import native
-from ..field_modifier import motion
+from ..field_modifier import layers, motion
 from ..live import sessions
 
 solved = {}  # session_uid of a source → the Pose of its last solve, until the file is left
@@ -64,5 +64,6 @@ def apply(context, source, pose, strength):
     shapes = carrying.moved(native.library(), pose.samples, pose.field, carried, strength)
     motion.bind(context, source)
     motion.write(source, motion.Motion(offsets, turns))
+    layers.note(source, "")
     carrying.put(context, shapes)
     return carrying.take_warnings()

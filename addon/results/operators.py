@@ -10,7 +10,7 @@ from ..carried import carried_objects, rest_bones
 from ..core.errors import UserError
 from ..core.runtime.jobs import Item
 from ..core.settings.parameters import EXTRACTION
-from ..field_modifier import motion
+from ..field_modifier import layers, motion
 from ..field_nodes import helper
 from ..jobs.job_operator import JobOperator
 from ..properties.choices import extraction, surface
@@ -26,7 +26,7 @@ class FieldOperator(SourceOperator):
 
     @classmethod
     def refuses(cls, source):
-        if modifier_stack.find(source) is None:
+        if modifier_stack.top(source) is None:
             return UserError("{name} has no ARAP Fields modifier", source)
         if settings_of(source).live_kind:
             return UserError("{name} is live; end live mode first", source)
@@ -43,6 +43,7 @@ class ARAPFIELDS_OT_apply_as_shape_key(FieldOperator, bpy.types.Operator):
         return super().refuses(source) or placement.refusal(source, "WARP", "KEY")
 
     def change(self, context, source):
+        layers.uncover(source)
         with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
             before = mesh_arrays.positions(mesh)
         with modifier_stack.moved_mesh(context, source) as mesh:
@@ -52,6 +53,7 @@ class ARAPFIELDS_OT_apply_as_shape_key(FieldOperator, bpy.types.Operator):
             source.shape_key_add(name="Basis", from_mix=False)
         result_objects.add_warp_key(source, before, after)
         motion.discard(source)
+        layers.uncover(source)
 
 
 class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
@@ -60,11 +62,14 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
     bl_label = "Remove"
 
     def change(self, context, source):
+        layers.uncover(source)
         try:
-            rest_bones.reset(context, source)
+            if not modifier_stack.layers(source):
+                rest_bones.reset(context, source)
         except UserError as error:
             self.report({"WARNING"}, translated(error))
         motion.remove(source)
+        layers.uncover(source)
         carried_objects.give_back_all(source)
         helper.clear(source)
 

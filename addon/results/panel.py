@@ -15,7 +15,7 @@ class ARAPFIELDS_PT_result(Advanced, bpy.types.Panel):
         layout = self.layout
         draw_settings(layout, settings, "output", "result", "resolution", "refine_thin", "normals")
         layout.operator(Op.EXTRACT, icon="OUTLINER_OB_SURFACE")
-        modifier = modifier_stack.find(source)
+        modifier = modifier_stack.top(source)
         if modifier is not None:
             modifier_row(layout, modifier, "GEOMETRY_NODES", Op.REMOVE_FIELD)
             layout.operator(Op.APPLY_KEY, icon="SHAPEKEY_DATA")

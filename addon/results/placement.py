@@ -15,7 +15,7 @@ from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError, refuse
 from ..core.geometry.edges import Topology
 from ..core.geometry.spaces import space_of
-from ..field_modifier import armatures, motion
+from ..field_modifier import armatures, layers, motion
 from ..handles import empties
 from ..names import REPORT
 from . import result_objects
@@ -48,6 +48,12 @@ def placement_refusal(source):
     return refusal(source, settings.output, effective_result(settings.output, settings.result))
 
 
+def replaced_by(source, kind):
+    """The UserError that says which result a run of that kind replaces; None where nothing is lost."""
+    is_lost = not settings_of(source).live_kind and settings_of(source).result != "NEW"
+    return layers.replaced(source, kind) if is_lost else None
+
+
 def effective_result(output, result):
     """Where a result goes: surfaces, which no modifier can make of the mesh, go to a new object."""
     return "NEW" if result == "MODIFIER" and output != "WARP" else result
@@ -71,6 +77,7 @@ def place_result(context, source, kind, output, result, moved, before):
     if keeps_mesh(output, result):
         motion.bind(context, source)
         motion.write(source, motion.Motion(moved.vertices - before, moved.turns, moved.changes))
+        layers.note(source, kind)
         source[REPORT] = json.dumps(moved.report)
         return source
     if moved.topology is None and len(source.data.vertices) != len(before):
@@ -90,6 +97,9 @@ def place_result(context, source, kind, output, result, moved, before):
         mesh_arrays.set_positions(source.data, moved.vertices)
     armatures.silence(source)
     motion.discard(source)  # what it moved is part of the mesh now
+    if source.data.shape_keys is None:
+        layers.discard(source)
+    layers.uncover(source)
     source[REPORT] = json.dumps(moved.report)
     if result == "REPLACE":
         for entry in empties.used(source):

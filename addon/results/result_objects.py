@@ -153,10 +153,12 @@ def add_frame(item, frames, number, shape):
 
 
 def keeps_vertices(source, in_place=False):
-    """Whether the shape to work on has just the vertices of the object's own mesh: no modifier acts."""
+    """Whether the shape to work on has just the vertices of the object's own mesh: no modifier acts, but
+    results below where that is worked on."""
     keys = source.data.shape_keys
     usable = keys is None or (keys.use_relative and not source.show_only_shape_key)
-    return usable and not modifier_stack.shown_before(source, in_place)
+    before = modifier_stack.shown_before(source, in_place)
+    return usable and all(in_place and modifier_stack.is_layer(modifier) for modifier in before)
 
 
 def add_warp_key(item, before, after):

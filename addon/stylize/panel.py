@@ -17,7 +17,7 @@ from ..core.settings.styles import CUSTOM, STYLIZE
 from ..live.panel import live_buttons, playback_progress
 from ..names import Op
 from ..properties.choices import STYLE_ITEMS
-from ..results.placement import placement_refusal
+from ..results.placement import placement_refusal, replaced_by
 from ..solver import style_settings
 from . import ball
 
@@ -65,7 +65,7 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
         live_buttons(layout, source, "STYLIZE", reason)
         job_button(layout, Op.STYLIZE, "MOD_EDGESPLIT")
         playback_progress(layout, source, "STYLIZE")
-        note(layout, reason, placement_refusal(source))
+        note(layout, reason, placement_refusal(source), replaced_by(source, "STYLIZE"))
 
 
 class ARAPFIELDS_PT_stylize_settings(Advanced, bpy.types.Panel):

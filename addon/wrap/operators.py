@@ -17,6 +17,7 @@ from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.parameters import WRAP
 from ..deform.solve_job import SolveOperator, plan_solve_job
+from ..field_modifier import layers
 from ..properties.choices import result_properties
 from ..results.placement import holds_place
 from . import landmarks, transfer
@@ -53,6 +54,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         """Where nothing came of it, the field's modifier stands again where it did."""
         for below in self.below:
             below.give_back()
+        SolveOperator.clear_up(self, job)
 
     def plan(self, context, source, weights):
         settings = settings_of(source)
@@ -62,7 +64,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         options = options_of("wrap", values)
         space = space_of(source.matrix_world, source.name)
         other = landmarks.target_of(source, self.onto)
-        self.end_live(context, source)
+        self.end_live(context, source, "WRAP")
         fitting, below = None, ()
         if (
             effective_value("fit_rig", settings.wrap, self)
@@ -195,6 +197,7 @@ class ARAPFIELDS_OT_transfer(SourceOperator, bpy.types.Operator):
     def change(self, context, source):
         target = landmarks.target_of(source, self.onto)
         kinds = effective_value("transfer", settings_of(source).wrap, self)
+        layers.uncover(source)
         work = transfer.Transfer(context, source, target)
         return transfer.message(target, work.carry(kinds), work.notes)
 

@@ -8,7 +8,7 @@ from ..carried import rest_bones
 from ..core.settings.parameters import WRAP
 from ..field_modifier import inputs
 from ..names import Op
-from ..results.placement import holds_place, placement_refusal
+from ..results.placement import holds_place, placement_refusal, replaced_by
 from . import landmarks
 
 
@@ -61,12 +61,12 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
         job_button(layout, Op.WRAP_SHEET, "IMAGE_DATA")
         draw_settings(layout, wrap, "frames")
         job_button(layout, Op.WRAP_SEQUENCE, "REC")
-        note(layout, landmarks.refusal(source), placement_refusal(source))
+        note(layout, landmarks.refusal(source), placement_refusal(source), replaced_by(source, "WRAP"))
 
 
 def factor_slider(layout, source):
     """How far the field's modifier takes the object, from rest to the result."""
-    modifier = modifier_stack.find(source)
+    modifier = next(iter(modifier_stack.layers(source)), modifier_stack.find(source))
     if modifier is None:
         return
     socket = inputs.slot(modifier, "Factor")

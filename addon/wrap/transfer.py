@@ -23,7 +23,7 @@ LEAST_WEIGHT = 1e-4  # what is below is no member of a group
 
 def not_wrapped(source):
     """Why a source has nothing to hand on yet, as a UserError; None where it has."""
-    if modifier_stack.find(source) is None:
+    if modifier_stack.top(source) is None:
         return UserError("Wrap {name} first, with Modifier as its result", source)
     return None
 

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Results that stay below: a style acts on what a wrap has made of an object, a deformation on both.
+
+A layer is a modifier of ours that the field has left. It keeps its place, its fading and, under names of its
+own, its motion. Where the field's modifier goes, the last layer becomes it again.
+"""
+
+import contextlib
+from itertools import count
+
+from ..blender import modifier_stack
+from ..blender.object_references import settings_of
+from ..blender.splat_layouts import holds_splats
+from ..core.errors import UserError
+from ..names import FIELD_MODIFIER, LAYER_GROUP
+from . import cache_modifier, inputs, motion, node_group
+
+ORDER = {"WRAP": 0, "STYLIZE": 1, "DEFORM": 2}  # each acts on what those before it have made
+STAYING = {"WRAP": "Wrap", "STYLIZE": "Stylize"}  # kinds that stay below others, and what they are called
+POSED = "POSED"  # kind of a style that holds its handles: a pose over it would move them twice
+
+
+def note(source, kind):
+    """Notes what a source's field follows: its kind, POSED for a style with handles, or ""."""
+    settings = settings_of(source)
+    if kind == "STYLIZE" and settings.stylize.use_handles and settings.handles:
+        kind = POSED
+    if settings.moved_by != kind:  # a write counts as a change of the object
+        settings.moved_by = kind
+
+
+def can_stay(source):
+    """Whether the field's modifier of a source can become a layer."""
+    settings, field = settings_of(source), modifier_stack.find(source)
+    if field is None or settings.moved_by not in STAYING or source.mode == "EDIT" or source.library:
+        return False
+    further = settings.carried or settings.carried_by or settings.field_helper or holds_splats(source)
+    return not further and field.show_viewport and not cache_modifier.is_playing(source)
+
+
+def stays_below(source, kind):
+    """Whether a run of that kind acts on what the field has made."""
+    return can_stay(source) and ORDER[settings_of(source).moved_by] < ORDER[kind]
+
+
+def replaced(source, kind):
+    """The UserError that says which result a run of that kind replaces; None where it is one of its own kind,
+    or stays."""
+    by = settings_of(source).moved_by.replace(POSED, "STYLIZE")
+    if modifier_stack.find(source) is None or by in ("", kind) or stays_below(source, kind):
+        return None
+    operation = {"DEFORM": "Deform", **STAYING}[by]
+    return UserError("{name}: this replaces the result of {operation}", source, operation=operation)
+
+
+def make_way(source, kind):
+    """Before the shape is read on which a run of that kind acts: what it acts on becomes a layer; what lies
+    over that goes. Returns the latter, for `put_back` where nothing comes of the run."""
+    gone = []
+    if stays_below(source, kind):
+        cover(source)
+    while modifier_stack.layers(source) and ORDER[kind_in(modifier_stack.layers(source)[-1])] >= ORDER[kind]:
+        field, by = modifier_stack.find(source), settings_of(source).moved_by
+        gone.append(field and (motion.snapshot(source), by, inputs.get(field, "Factor")))
+        motion.discard(source)
+        uncover(source)
+    return gone
+
+
+def put_back(context, source, gone):
+    """After a run of which nothing came: the layers and the motion over them are as before."""
+    for one in reversed(gone):
+        if not can_stay(source):
+            break
+        cover(source)
+        if one is not None:
+            moved, by, factor = one
+            with contextlib.suppress(UserError):  # the mesh is another one by now
+                inputs.put(motion.bind(context, source), "Factor", factor)
+                motion.write(source, moved)
+                settings_of(source).moved_by = by
+    if not gone:
+        uncover(source)
+
+
+def parts(layer):
+    """(kind, number, domain of free normals or "") of a layer."""
+    _, kind, number, *normals = layer.node_group[LAYER_GROUP].split()
+    return kind, number, "".join(normals)
+
+
+def kind_in(layer):
+    return parts(layer)[0]
+
+
+def cover(source):
+    """Makes the field's modifier the last layer."""
+    settings, field = settings_of(source), modifier_stack.find(source)
+    mesh, kind, normals = motion.carrier(source, field), settings.moved_by, node_group.normals_of(field)
+    taken = {int(parts(layer)[1]) for layer in modifier_stack.layers(source)}
+    number = next(n for n in count(1) if n not in taken and node_group.names_of(n)[0] not in mesh.attributes)
+    motion.written.add(source.session_uid)
+    motion.write_to(mesh, motion.read_from(mesh), number)
+    if mesh != source.data or mesh.users == 1:
+        motion.write_to(mesh, motion.Motion(None))
+    motion.take_group(field, node_group.find_or_make_layer(kind, number, normals))
+    rename(field, FIELD_MODIFIER, f"{FIELD_MODIFIER} {STAYING[kind]}")
+    settings.under_rig, settings.moved_by = False, ""
+
+
+def uncover(source):
+    """Makes the last layer the field's modifier, where there is none and no bake plays in its place."""
+    layers = modifier_stack.layers(source)
+    owned = modifier_stack.find(source) or modifier_stack.find_cache(source)
+    if not layers or owned is not None or source.mode == "EDIT":
+        return
+    layer = layers[-1]
+    kind, number, normals = parts(layer)
+    mesh = motion.carrier(source, layer)
+    motion.written.add(source.session_uid)
+    moved = motion.read_from(mesh, number)
+    if mesh == source.data and mesh.users > 1:
+        mesh = mesh.copy()  # others that share it have motions of their own
+        motion.take_helper(source, layer, mesh)
+    motion.write_to(mesh, moved)
+    motion.write_to(mesh, motion.Motion(None), number)
+    motion.take_group(layer, node_group.find_or_make(normals))
+    rename(layer, f"{FIELD_MODIFIER} {STAYING[kind]}", FIELD_MODIFIER)
+    behind = list(source.modifiers)[list(source.modifiers).index(layer) :]
+    settings_of(source).under_rig = kind == "WRAP" and any(one.type == "ARMATURE" for one in behind)
+    settings_of(source).moved_by = kind
+
+
+def rename(modifier, old, new):
+    """A name that the user gave stays."""
+    if modifier.name == old:
+        modifier.name = new
+
+
+def discard(source):
+    """Takes the layers away where what they moved is part of the mesh now."""
+    while modifier_stack.layers(source) and modifier_stack.find(source) is None:
+        uncover(source)
+        motion.discard(source)

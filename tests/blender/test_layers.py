@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What moves an object further acts on what a style has made of it, and nothing of that is lost."""
+
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER
+
+import arapfields
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.layers import QUICK, SAME, STYLE, structure, styled, with_handles
+    from support.blender.live import WAIT, step
+    from support.blender.pins import pin, state
+
+    from addon.blender import modifier_stack
+    from addon.core.runtime import jobs
+    from addon.field_modifier import layers
+    from addon.live import sessions
+    from addon.pin_tool import drag
+    from addon.solver import setup
+
+pytestmark = pytest.mark.in_blender
+
+
+@pytest.mark.parametrize("stack", [(), ("MIRROR",), ("keys",), ("ARMATURE",)])
+def test_deform_acts_on_the_styled_shape(stack):
+    bar, shape, _ = styled(stack)
+    before = structure(bar)
+    moving = with_handles(bar)
+    assert np.array_equal(scenes.world_points(bar), shape)
+    alone = bpy.data.objects.new(
+        "Alone", bpy.data.meshes.new_from_object(bar.evaluated_get(bpy.context.evaluated_depsgraph_get()))
+    )
+    bpy.context.collection.objects.link(alone)
+    moving.location.z += 0.5
+    bpy.context.view_layer.update()
+    assert bpy.ops.arapfields.deform(**QUICK) == {"FINISHED"}
+    moved = scenes.world_points(bar)
+    scenes.activate(alone)
+    with_handles(alone).location.z += 0.5
+    bpy.context.view_layer.update()
+    assert bpy.ops.arapfields.deform(**QUICK) == {"FINISHED"}
+    assert np.abs(moved - shape).max() > 0.3 and np.abs(moved - scenes.world_points(alone)).max() < 0.01
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.deform(**QUICK) == {"FINISHED"}  # again: over the style, not over itself
+    assert np.abs(scenes.world_points(bar) - moved).max() < SAME
+    bpy.ops.arapfields.remove_field()
+    assert np.array_equal(scenes.world_points(bar), shape)
+    assert structure(bar)[:4] == before[:4]
+
+
+def test_a_drag_over_a_style_is_cancelled_undone_and_deleted_bit_for_bit():
+    setup.SAMPLES = 500
+    styled()
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.ed.undo_push(message="styled")
+    bar = bpy.data.objects["Bar"]
+    before, shape = (state(bar), structure(bar)), scenes.world_points(bar)
+    place = shape[shape[:, 0].argmax()]
+    dragged = drag.of_new_pin(bpy.context, bar, place, 0.15)
+    dragged.move(bpy.context, place + np.array([0, 0, 0.3]))
+    step()
+    assert np.abs(scenes.world_points(bar) - shape).max() > 0.1
+    dragged.cancel(bpy.context)
+    assert (state(bar)[:5], structure(bar)) == (before[0][:5], before[1])
+    pin(bar, place)
+    assert np.array_equal(scenes.world_points(bar), shape)
+    bpy.ops.ed.undo_push(message="placed")
+    for name, target in (("dragged", 0.3), ("dragged again", 0.6)):
+        bar = bpy.data.objects["Bar"]
+        pin(bar, scenes.world_points(bar)[shape[:, 0].argmin()], target=shape[shape[:, 0].argmin()] + target)
+        sessions.update(bpy.context, wait=WAIT, refined=True)
+        bpy.ops.ed.undo_push(message=name)
+    last = scenes.world_points(bpy.data.objects["Bar"])
+    assert np.abs(last - shape).max() > 0.3
+    for _ in range(2):
+        for _ in range(3):
+            bpy.ops.ed.undo()
+            sessions.update(bpy.context, wait=WAIT, refined=True)
+        bar = bpy.data.objects["Bar"]
+        assert structure(bar) == before[1] and np.array_equal(scenes.world_points(bar), shape)
+        for _ in range(3):
+            bpy.ops.ed.redo()
+            sessions.update(bpy.context, wait=WAIT, refined=True)
+        assert np.array_equal(scenes.world_points(bpy.data.objects["Bar"]), last)
+    bar = bpy.data.objects["Bar"]
+    for entry in list(bar.arapfields.handles):
+        scenes.activate(bar.arapfields.handles[0].empty)
+        assert entry is not None and bpy.ops.arapfields.pin_delete() == {"FINISHED"}
+    assert structure(bar) == before[1] and np.array_equal(scenes.world_points(bar), shape)
+
+
+@pytest.mark.parametrize("live_style", [False, True])
+def test_live_over_a_style_ends_with_it(live_style):
+    setup.SAMPLES = 500
+    bar, shape, _ = styled()
+    moving = with_handles(bar)
+    if live_style:
+        bpy.ops.arapfields.remove_field()
+        assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
+        step(refined=True)
+        shape = scenes.world_points(bar)
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    step(refined=True)
+    assert np.abs(scenes.world_points(bar) - shape).max() < (SAME if not live_style else 0.02)
+    moving.location.z += 0.4
+    step(refined=True)
+    moved = scenes.world_points(bar)
+    assert np.abs(moved - shape).max() > 0.2
+    bpy.ops.arapfields.live()
+    assert np.abs(scenes.world_points(bar) - shape).max() < (SAME if not live_style else 0.02)
+    bpy.ops.arapfields.live()
+    step(refined=True)
+    bpy.ops.arapfields.live_keep()
+    assert np.abs(scenes.world_points(bar) - moved).max() < 0.01
+    assert [layers.kind_in(layer) for layer in modifier_stack.layers(bar)] == ["STYLIZE"]
+
+
+def fail(*_, **__):
+    raise ValueError("no style")
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_style_that_is_changed_takes_off_what_lies_over_it(fails):
+    bar, shape, _ = styled()
+    with_handles(bar).location.z += 0.4
+    bpy.context.view_layer.update()
+    bpy.ops.arapfields.deform(**QUICK)
+    moved, before = scenes.world_points(bar), structure(bar)
+    jobs.forget_messages()
+    if fails:
+        stylize, arapfields.stylize = arapfields.stylize, fail
+        try:
+            with pytest.raises(RuntimeError, match="no style"):
+                bpy.ops.arapfields.stylize(**STYLE)
+        finally:
+            arapfields.stylize = stylize
+    else:
+        assert bpy.ops.arapfields.stylize(**STYLE) == {"FINISHED"}
+        assert "Bar: this replaces the result of Deform" in str(jobs.messages())
+        assert np.abs(scenes.world_points(bar) - shape).max() < SAME and len(bar.modifiers) == 1
+        assert bpy.ops.arapfields.deform(**QUICK) == {"FINISHED"}
+    assert np.abs(scenes.world_points(bar) - moved).max() < SAME and structure(bar) == before
