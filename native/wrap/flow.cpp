@@ -20,7 +20,7 @@ using namespace wrap_parameters;
 using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 /// t: 0 in the first stage, 1 in the last.
-WrapStage stage_at(double t, const WrapOptions& options) {
+WrapStage stage_at(double t, const WrapOptions& options, const LandmarkPull& pull) {
   const auto most_centers = static_cast<double>(options.centers);
   const Schedule closeness{correspondence_weight.first, correspondence_weight.last * options.closeness},
       centers{std::min(first_centers, most_centers), most_centers};
@@ -30,7 +30,7 @@ WrapStage stage_at(double t, const WrapOptions& options) {
                            .normals = options.normal_weight,
                            .tangential = tangential_weight.at(t),
                            .unoriented = unoriented_weight * t * t};
-  stage.landmarks = landmark_weight * options.landmark_weight;
+  stage.landmarks = pull.weight * std::pow(pull.growth, t);
   stage.rigidity = rigidity.at(t);
   stage.viscosity = viscosity * options.bending;
   stage.center_radius = center_radius.at(t);
@@ -79,12 +79,12 @@ struct WrapFlow::StepSamples {
 };
 
 WrapFlow::WrapFlow(const SurfaceSamples& samples, const WrapTarget& target, PointsIn landmarks,
-                   PointsIn landmark_targets, std::vector<Index> pulled, std::uint64_t seed)
+                   PointsIn landmark_targets, LandmarkPull pull, std::uint64_t seed)
     : target_(target),
       random_(seed),
       landmarks_(landmarks),
       landmark_targets_(landmark_targets),
-      pulled_(std::move(pulled)) {
+      pull_(std::move(pull)) {
   const std::vector<Index> rows = stratified(morton_order(samples.points), moved_samples, random_);
   points_ = rows_of(samples.points, rows);
   rest_normals_ = rows_of(samples.normals, rows);
@@ -196,8 +196,8 @@ void WrapFlow::step(const WrapStage& stage, const Progress& progress) {
     stiffness.viscosity = stiffness.viscosity.cwiseProduct(samples.bend_weights);
 
   // Velocity, and the motion along it.
-  const LandmarkTerm landmarks{rows_of(landmarks_, pulled_), rows_of(landmark_targets_ - landmarks_, pulled_),
-                               stage.landmarks * unit};
+  const LandmarkTerm landmarks{rows_of(landmarks_, pull_.rows),
+                               rows_of(landmark_targets_ - landmarks_, pull_.rows), stage.landmarks * unit};
   const RadialBasis centers = basis(stage, samples.surface.points);
   move(centers, solve_velocity(centers, stiffness, correspondences, landmarks, progress.part(0.2, 0.8)),
        samples.surface.points);
@@ -209,7 +209,7 @@ void WrapFlow::run(const WrapOptions& options, const Progress& progress, const s
   for (int done = 0; done < all; ++done) {
     const int stage = done / options.iterations;
     const double t = options.stages > 1 ? static_cast<double>(stage) / (options.stages - 1) : 1.0;
-    step(stage_at(t, options), progress.part(done / all, (done + 1) / all));
+    step(stage_at(t, options, pull_), progress.part(done / all, (done + 1) / all));
     if (after) after();
   }
 }

@@ -23,16 +23,22 @@ struct WrapStage {
   Index centers = 60;          ///< their number
 };
 
+/// The landmarks that a flow pulls onto their targets; the others go along.
+struct LandmarkPull {
+  std::vector<Index> rows;  ///< which of the landmarks
+  double weight = 0.0;      ///< of their mean squared distance, in the first stage
+  double growth = 1.0;      ///< of the weight, up to the last stage
+};
+
 /// A surface that flows onto an aligned target, in the source's cube. Each step solves for a smooth velocity
 /// that balances correspondences and landmarks against stiffness, and moves the surface by it. Steps are so
 /// small that each is invertible: space never folds, and sheets do not pass through each other. Centers of
 /// the velocity stand on both surfaces in their current positions.
 class WrapFlow {
  public:
-  /// Landmarks and their targets are (k,3); those with these rows are pulled, the others go along. `target`
-  /// must outlive the flow.
+  /// Landmarks and their targets are (k,3). `target` must outlive the flow.
   WrapFlow(const SurfaceSamples& samples, const WrapTarget& target, PointsIn landmarks,
-           PointsIn landmark_targets, std::vector<Index> pulled, std::uint64_t seed);
+           PointsIn landmark_targets, LandmarkPull pull, std::uint64_t seed);
 
   void step(const WrapStage& stage, const Progress& progress);
   /// All steps of all stages; `after` is called after each.
@@ -56,7 +62,7 @@ class WrapFlow {
   RowMatrix<double> jacobians_;   // (n,9), row-major
   Vector weights_, bend_weights_;
   Points landmarks_, landmark_targets_;
-  std::vector<Index> pulled_;
+  LandmarkPull pull_;
   std::vector<FieldStep> steps_;
   double matched_share_ = 1.0;
 };

@@ -167,12 +167,11 @@ class Vote {
 
  private:
   Trial tried(const Similarity& at, const std::vector<Index>& pulled, double pull) const {
-    WrapOptions options = options_;
-    options.landmark_weight = pull;
     const WrapTarget placed = target_.transformed_back(at);
-    WrapFlow flow(samples_, placed, source_.landmarks, at.inverse_of(source_.landmark_targets), pulled,
+    WrapFlow flow(samples_, placed, source_.landmarks, at.inverse_of(source_.landmark_targets),
+                  {pulled, wrap_parameters::landmark_weight.first * pull},
                   static_cast<std::uint64_t>(options_.seed));
-    flow.run(options, progress_);
+    flow.run(options_, progress_);
     return {(at.of(flow.landmarks()) - source_.landmark_targets).rowwise().norm() / target_.diagonal,
             flow.stretch()};
   }

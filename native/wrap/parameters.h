@@ -35,8 +35,9 @@ constexpr double coverage = 5.75;  // tuned
 /// Weight in the last stage of correspondences without regard to normals; it grows with t². They draw in
 /// parts that have no counterpart.
 constexpr double unoriented_weight = 1.0;  // tuned
-/// Weight of the mean squared distance of landmarks, times the option landmark_weight.
-constexpr double landmark_weight = 30.0;  // tuned
+/// Weight of the mean squared distance of landmarks, times the option landmark_weight. It grows as that of
+/// the correspondences does, which would pull landmarks off their places in the end.
+constexpr Schedule landmark_weight{30.0, 3000.0};  // tuned
 /// Radius of the radial functions: half of the target, then about the size of its details.
 constexpr Schedule center_radius{0.5, 0.067};  // tuned
 /// Number of centers in the first stage; the last has the option centers.

@@ -82,7 +82,10 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
 
   // Stages of falling stiffness.
   const WrapTarget flow_target = target.subsample(flow_target_samples);
-  WrapFlow flow(samples, flow_target, source.landmarks, landmark_targets, verdict.kept, seed);
+  WrapFlow flow(samples, flow_target, source.landmarks, landmark_targets,
+                {verdict.kept, landmark_weight.first * options.landmark_weight,
+                 landmark_weight.last / landmark_weight.first},
+                seed);
   flow.run(options, progress.part(0.2, 0.95), [&] {
     ++report.iterations;
     progress.preview([&](PointsIn points) { return field_of(flow.steps(), placement, samples)->at(points); });
