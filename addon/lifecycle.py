@@ -80,6 +80,7 @@ def after_update(scene, depsgraph):
             active = getattr(bpy.context, "active_object", None)
             if active is not None and active.library is None:
                 copies.switch_off(active)
+                recovery.forget_copy(active)
 
 
 @persistent

@@ -63,6 +63,21 @@ def bring_back(source):
     return True
 
 
+def forget_copy(item):
+    """A copy of a live object is not live itself; what it shows is its own."""
+    settings = settings_of(item)
+    others = (session.number for uid, session in live.items() if uid != item.session_uid)
+    if not settings.live_kind or is_live(item) or settings.live_number not in others:
+        return
+    settings.live_kind = ""
+    visibility.forget(item)
+    if item.data.users == 1:
+        stored.put_mark(item, "")
+    for index in reversed(range(len(settings.results))):
+        if settings.results[index].kind == live_object.LIVE:
+            settings.results.remove(index)
+
+
 def discard_live_object(source):
     """The modifier has what that step says."""
     item = live_object.forget(source)

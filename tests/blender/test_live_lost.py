@@ -123,3 +123,20 @@ def test_a_live_object_that_undo_left_in_no_scene_goes_too():
     bar.arapfields.live_kind = bar.arapfields.live_hidden = ""
     step()
     assert not sessions.live and "Bar_live" not in bpy.data.objects and "Bar_live" not in bpy.data.meshes
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_copy_of_a_live_object_is_not_live(linked):
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.4
+    step(refined=True)
+    shown = scenes.world_points(bar)
+    scenes.activate(bar)
+    bpy.ops.object.duplicate(linked=linked)
+    copied = bpy.context.object
+    step(refined=True)
+    assert sessions.is_live(bar) and not copied.arapfields.live_kind
+    assert bpy.ops.arapfields.remove_field() == {"FINISHED"} and not copied.modifiers
+    step(refined=True)
+    assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
