@@ -15,7 +15,7 @@ from ..solver import frame_range, secondary_motion
 from ..solver.frame_solver import FrameSolver
 from ..solver.setup import sampled
 from ..solver.simulation import Simulation
-from ..solver.source_reader import SourceChanged, SourceReader
+from ..solver.source_reader import SourceChanged, SourceReader, has_motion_before
 from . import loops
 from .caches import CacheFile, ShapeKeys, cache_beside, keys_weight, size_text
 from .carried_bake import CarriedBake
@@ -47,6 +47,8 @@ class ObjectBake:
         settings, fps = settings_of(source), secondary_motion.frame_rate(context.scene)
         self.in_place = placement.in_place(settings.output, settings.result) and path is not None
         self.reader = SourceReader(context, source, kind, self.in_place)
+        if not self.in_place and settings.output == "WARP":  # live mode shows the pose at hand, a bake all
+            self.reader.moves_by_itself = has_motion_before(source, in_place=False)
         self.frames, self.solver, self.error = frames, None, None
         beside = None if path is None else functools.partial(cache_beside, path, modifier_path)
         self.carried = CarriedBake(self.reader.carrying, frames, beside, fps, is_shared=part is not None)

@@ -25,14 +25,21 @@ STROKE = 0.3  # seconds without a touch of the brush after which a stroke has en
 class Updates(NamedTuple):
     """What Blender has just updated: data-blocks, and the session_uids of some of them."""
 
-    items: list
+    items: list  # objects only where they, or their geometry, have moved
     meshes: set  # with new geometry
     objects: set  # with new geometry
     data: set  # all that are no objects
 
     @classmethod
     def of(cls, depsgraph):
-        items = [update.id.original for update in depsgraph.updates]
+        moved = [
+            update
+            for update in depsgraph.updates
+            if update.is_updated_geometry
+            or update.is_updated_transform
+            or not isinstance(update.id, bpy.types.Object)
+        ]
+        items = [update.id.original for update in moved]
         shapes = [update.id.original for update in depsgraph.updates if update.is_updated_geometry]
         return cls(
             items,
@@ -55,10 +62,12 @@ class EditWatch:
         source = self.reader.reference.find()
         if source is None:
             return
-        if source.data.session_uid in updates.meshes:
+        has_new_shape = source.data.session_uid in updates.meshes
+        if has_new_shape:
             self.may_be_edited |= source.session_uid not in motion.written
             self.edited_at = time.monotonic()
-        elif self.reader.moves_by_itself and any(may_move(item, source) for item in updates.items):
+        items = [item for item in updates.items if item != source or not has_new_shape]
+        if self.reader.moves_by_itself and any(may_move(item, source) for item in items):
             self.may_have_moved = True
 
     def require_unedited(self, context, source):

@@ -41,7 +41,8 @@ class Session:
     def __init__(self, context, source, kind="DEFORM", earlier=None, keeps_shape=False, gone=()):
         settings = settings_of(source)
         in_place = placement.in_place(settings.output, settings.result)
-        self.keeps_shape, self.gone, self.layout = keeps_shape, gone, layout_of(source, kind, context.scene)
+        self.keeps_shape, self.gone, self.kind = keeps_shape, gone, kind
+        self.layout = layout_of(source, kind, context.scene)
         self.reader = SourceReader(context, source, kind, in_place)
         self.edits, self.solver, self.worker = EditWatch(self.reader), LiveSolver(self.reader), None
         is_still = keeps_shape or animation_range(source, kind) is None
@@ -62,10 +63,6 @@ class Session:
     @property
     def source(self):
         return self.reader.reference
-
-    @property
-    def kind(self):
-        return self.reader.kind
 
     @property
     def carrying(self):
@@ -230,13 +227,14 @@ class Session:
         """Shows a frame that is solved already, or one of secondary motion, which is waited for."""
         if self.playback.frames is None and not self.has_motion:
             return
+        self.edits.may_have_moved = self.reader.moves_by_itself
         self.update(context)
         if self.has_motion:
             self.playback.wait(self.requested, PATIENCE)
         self.show()
 
     def show_last(self):
-        """What the worker made before it ended; an error of it no longer matters."""
+        """What the worker made before it ended, whose errors no longer matter."""
         with contextlib.suppress(UserError, ReferenceError):
             self.show()
 

@@ -42,7 +42,7 @@ class SourceReader:
         self.reference, self.kind = ObjectReference(source), kind
         self.carrying = Carrying(context, source)
         self.surface = read_surface(context, source, in_place, carrying=self.carrying)
-        self.moves_by_itself = in_place and has_motion_before(source)
+        self.moves_by_itself = in_place and has_motion_before(source, in_place)
         self.fingerprint = mesh_arrays.fingerprint(source.data)
         self.points = self.surface.local  # where the modifiers before have them now
         self.handles, self.setup = [], None
@@ -84,7 +84,7 @@ class SourceReader:
 
     def read_points(self, context, source):
         """Where the modifiers before have the points now: the field is evaluated there."""
-        with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
+        with modifier_stack.evaluated_mesh(context, source, self.surface.in_place) as mesh:
             points = mesh_arrays.positions(mesh)
         if len(points) != len(self.points):
             raise SourceChanged(source.name)
@@ -136,6 +136,6 @@ def uses_handles(settings, kind):
     return kind == "DEFORM" or (kind == "STYLIZE" and settings.stylize.use_handles)
 
 
-def has_motion_before(source):
-    """Whether the points at the field's place may move without an edit of the mesh."""
-    return bool(modifier_stack.shown_before(source, in_place=True) or shape_keys_of(source.data))
+def has_motion_before(source, in_place):
+    """Whether the points that are worked on may move without an edit of the mesh."""
+    return bool(modifier_stack.shown_before(source, in_place) or shape_keys_of(source.data))
