@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 from support.programs.environments import fresh, run
-
-ROOT = Path(__file__).resolve().parents[2]
+from support.programs.native_build import BUILD, CMAKE, ROOT
 
 
 @pytest.fixture(scope="session")
@@ -27,3 +26,11 @@ def built(tmp_path_factory):
 def environment(built, tmp_path_factory):
     """The Python of an environment in which the wheel alone was asked for."""
     return fresh(tmp_path_factory.mktemp("right"), built[0])
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory):
+    """What `cmake --install` makes of the build."""
+    folder = tmp_path_factory.mktemp("prefix")
+    run(CMAKE, "--install", BUILD, "--prefix", folder)
+    return folder
