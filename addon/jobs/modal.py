@@ -17,8 +17,10 @@ class ModalRun:
             return self.execute(context)
         self.in_window, self._coroutine = True, self.coroutine(context)
         display.begin(context)
-        context.window_manager.modal_handler_add(self)
-        return self.advance(context)
+        result = self.advance(context)
+        if result == {"RUNNING_MODAL"}:  # what ends at once is freed, with a handler of it left
+            context.window_manager.modal_handler_add(self)
+        return result
 
     def modal(self, context, event):
         job = jobs.running()

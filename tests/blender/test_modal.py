@@ -119,3 +119,16 @@ def test_the_status_bar_is_cleared_when_the_extension_is_disabled():
         assert context.texts[-1] is None and not context.timers and jobs.running() is None
         assert running.modal(context, event("TIMER")) == {"CANCELLED"}
         addon.register()
+
+
+def test_what_ends_at_once_leaves_no_handler():
+    """Blender frees an operator that does not go on; a handler of it would be asked all the same."""
+
+    class Operator(ModalRun):
+        def coroutine(self, context):
+            yield Pause.REDRAW
+            return {"CANCELLED"}
+
+    with window() as context:
+        assert Operator().invoke(context, event("NONE")) == {"CANCELLED"}
+        assert not context.handlers and not context.timers
