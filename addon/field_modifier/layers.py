@@ -67,6 +67,12 @@ def make_way(source, kind):
     return gone
 
 
+def make_way_for_handle(source):
+    """Before a handle is made: it holds the shape that is seen. A live style goes on until a pose begins."""
+    if not settings_of(source).live_kind:
+        make_way(source, "DEFORM")
+
+
 def put_back(context, source, gone):
     """After a run of which nothing came: the layers and the motion over them are as before."""
     for one in reversed(gone):

@@ -81,7 +81,7 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
         if self.kind == "GROUP" and not group:
             raise UserError("{name} has no vertex group", source)
         selected = [item for item in context.selected_objects if item.type == "EMPTY"]
-        layers.make_way(source, "DEFORM")
+        layers.make_way_for_handle(source)
         is_new = not selected or self.place != "AUTO" or source.mode == "EDIT"
         if is_new:
             selected = [empties.new_empty(context, source, self.kind, group, self.place)]
@@ -115,7 +115,7 @@ class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
 
     def change(self, context, source):
         rig = bones.armature_of(context, source)
-        layers.make_way(source, "DEFORM")
+        layers.make_way_for_handle(source)
         groups = bones.holding_groups(context, source)
         names = bones.chosen(rig, self.bones, groups)
         for name in names:

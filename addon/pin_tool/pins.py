@@ -89,7 +89,7 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
     error = refusal(source)
     if error is not None:
         raise error
-    layers.make_way(source, "DEFORM")
+    layers.make_way_for_handle(source)
     settings, is_first = settings_of(source), not empties.used(source)
     place = places.find(context, source, location, radius, face, face_count)
     if is_first:

@@ -143,3 +143,24 @@ def test_a_style_that_is_changed_takes_off_what_lies_over_it(fails):
         assert np.abs(scenes.world_points(bar) - shape).max() < SAME and len(bar.modifiers) == 1
         assert bpy.ops.arapfields.deform(**QUICK) == {"FINISHED"}
     assert np.abs(scenes.world_points(bar) - moved).max() < SAME and structure(bar) == before
+
+
+@pytest.mark.parametrize("way", ["box", "pin"])
+def test_handles_that_are_added_while_a_style_is_live_leave_it_live(way):
+    bar, _, _ = styled()
+    bpy.ops.arapfields.remove_field()
+    assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
+    step(refined=True)
+    shape = scenes.world_points(bar)
+    if way == "box":
+        with_handles(bar)
+    else:
+        assert bpy.ops.arapfields.pin_add(location=shape[0], radius=0.1) == {"FINISHED"}
+    step(refined=True)
+    assert sessions.is_live(bar, "STYLIZE") and np.array_equal(scenes.world_points(bar), shape)
+    moving = bar.arapfields.handles[-1].empty
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    moving.location.z += 0.3
+    step(refined=True)
+    assert np.abs(scenes.world_points(bar) - shape).max() > 0.02 and len(modifier_stack.layers(bar)) == 1
