@@ -3,7 +3,9 @@
 
 import numpy as np
 import pytest
+from support.geometry import overlaps
 from support.geometry.bar import box, turned
+from support.geometry.characters import FOOT, LEG, trousers
 from support.geometry.parts import figure
 
 import arapfields as af
@@ -16,6 +18,8 @@ HEIGHT = 1.4
 FLIPPED = 0.03
 # Of the energy without contact: with other samples up to 1.26, and 3.1 where arms crumple.
 PRESSED, CRUMPLED = 1.6, 6.0
+# Of the area, inside another part.
+INSIDE = 5e-4
 
 
 def drag(live, way, steps=11):
@@ -47,3 +51,18 @@ def test_parts_that_cut_each_other_are_dragged_as_without_contact(way, crumples)
     assert np.abs(back - rest).max() < 1e-3 * HEIGHT
     assert max(flipped) <= max(free[0]) + FLIPPED
     assert energy < (CRUMPLED if crumples else PRESSED) * free[1]
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.03])
+def test_feet_that_jump_past_each_other_do_not_end_in_each_other(aside):
+    """Turned by 30°, each to beyond the other, in one solve, where large steps pass what they meet."""
+    vertices, triangles = af.extract_surface(trousers(), 48)[:2]
+    samples = af.sample_mesh(vertices, triangles, 8000, seed=0)
+    trunk = box([0, 0, 1.1], [0.3, 0.3, 0.3])
+    handles = [af.Cuboid(trunk, trunk)]
+    for side in (-1, 1):
+        foot = box([side * LEG, 0, FOOT], [0.1, 0.1, 0.1])
+        handles.append(af.Cuboid(foot, turned(-30 * side, shift=(-4 * side * LEG, -side * aside, 0)) @ foot))
+    field = af.deform(samples, handles, af.DeformOptions(centers=600), contact=af.Contact(itself=True))
+    assert overlaps.overlapping(vertices, field(vertices), triangles) < INSIDE
+    assert field.report.flipped_share == 0

@@ -12,13 +12,20 @@
 namespace arapfields {
 namespace {
 
-/// How far a target moves in one step, in cube units, and how many steps there are at most.
-constexpr double step_length = 0.15, step_length_itself = 0.06;
-constexpr Index most_steps = 24;
+/// How the targets are approached: how far one moves in a step, in cube units, the same where the surface
+/// meets itself, how many steps there are at most, and quasi-Newton steps in each.
+struct Pace {
+  double length, length_itself;
+  Index most_steps, iterations;
+};
+constexpr Pace usual{0.15, 0.06, 24, 3};
+/// Tried as well where usual steps have little to go by: in a solve in one go that ends with parts in each
+/// other, or begins with an obstacle across the surface.
+constexpr Pace small{0.04, 0.03, 60, 10};
 /// The same of obstacles.
 constexpr double obstacle_step = 0.02;
-/// Quasi-Newton steps of each, and between two searches for planes.
-constexpr Index steps_on_the_way = 3, steps_between = 6;
+/// Quasi-Newton steps between two searches for planes.
+constexpr Index steps_between = 6;
 /// A surface may be so deep beyond a margin, in cube units.
 constexpr double deep = 5e-4;
 /// Pushes at the end, while something is deeper, but not so deep that it is still on its way.
@@ -114,9 +121,10 @@ void report_contact(RadialState& s) {
   }
 }
 
-/// Takes the handles from earlier motions to their targets in so many steps.
-void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Index iterations,
-              double tolerance, const Progress& progress) {
+/// Takes the handles from earlier motions to their targets in so many steps, with `on_the_way` iterations in
+/// all but the last.
+void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Index on_the_way,
+              Index iterations, double tolerance, const Progress& progress) {
   s.precondition(0.0);
   Index left = iterations;
   double before_it = std::numeric_limits<double>::infinity(), least = before_it;
@@ -131,7 +139,7 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
       set_reachable_targets(s, wanted);
       const RowMatrix<double> here = s.shape.coefficients;
       if (steps == 1 && extra == more_rounds) start = s.extrapolate();
-      const Index at_once = k < steps ? steps_on_the_way : std::clamp<Index>(left, 2, steps_between);
+      const Index at_once = k < steps ? on_the_way : std::clamp<Index>(left, 2, steps_between);
       const bool converged = solve_round(s, here, at_once, tolerance, progress);
       if (k < steps) break;
       left -= at_once;
@@ -153,7 +161,7 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
 void sweep(RadialState& s, const std::vector<Mat4>& motions, double tolerance, const Progress& progress) {
   if (s.contact.obstacle_way() == 0.0) return;
   const auto wanted = static_cast<Index>(std::ceil(s.contact.obstacle_way() / obstacle_step));
-  const Index parts = std::clamp<Index>(wanted, 1, most_steps);
+  const Index parts = std::clamp<Index>(wanted, 1, usual.most_steps);
   s.precondition(0.0);
   for (Index k = 1; k <= parts; ++k) {
     s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(parts));
@@ -161,7 +169,7 @@ void sweep(RadialState& s, const std::vector<Mat4>& motions, double tolerance, c
     if (k == parts || !s.contact.presses()) continue;
     s.objective(s.fast);
     set_reachable_targets(s, motions);
-    solve_round(s, RowMatrix<double>(s.shape.coefficients), steps_on_the_way, tolerance, progress);
+    solve_round(s, RowMatrix<double>(s.shape.coefficients), usual.iterations, tolerance, progress);
   }
 }
 
@@ -201,7 +209,7 @@ bool come_apart(RadialState& s, const std::vector<Mat4>& before, bool rests, Ind
     return false;
   }
   const bool again = s.tried.targets.rows() == targets.rows();
-  if (again && (targets - s.tried.targets).rowwise().norm().maxCoeff() <= (rests ? 0.0 : step_length_itself))
+  if (again && (targets - s.tried.targets).rowwise().norm().maxCoeff() <= (rests ? 0.0 : usual.length_itself))
     return false;
   const double value = value_without_contact(s);
   const RadialShape shape = s.shape;
@@ -217,7 +225,7 @@ bool come_apart(RadialState& s, const std::vector<Mat4>& before, bool rests, Ind
     s.contact.release();
     if (!s.contact.overlaps(s.shape.coefficients)) return true;
   } else if (rests && s.contact.deepest_outside() <= 0.0) {
-    approach(s, before, 1, iterations, tolerance, progress);
+    approach(s, before, 1, 0, iterations, tolerance, progress);
     report_contact(s);
     if (!s.contact.overlaps(s.shape.coefficients) && value_without_contact(s) < (1.0 - better) * value)
       return true;
@@ -283,9 +291,10 @@ void follow_in_contact(RadialState& s, Index iterations, double tolerance,
   const Points from = s.handles.targets_at(motions_between(s.handles.bound(), before, 0.0));
   const double way = (s.handles.pairs().targets - from).rowwise().norm().maxCoeff();
   if (come_apart(s, before, way == 0.0, iterations, tolerance, freely, progress)) return;
-  const double length = s.contact.itself() ? step_length_itself : step_length;
+  const auto length = [&](const Pace& pace) { return s.contact.itself() ? pace.length_itself : pace.length; };
+  bool slowly = s.in_one_go && !s.contact.crossing().empty();
   RowMatrix<double> start;  // where parts were pushed apart that a free solve let overlap
-  const bool leaps = s.contact.only_itself() && way > length;  // the way back may be another one
+  const bool leaps = s.contact.only_itself() && way > length(usual);  // the way back may be another one
   if (leaps || (!pressed && s.contact.deepest() <= 0.0 && !s.contact.touches_itself())) {
     s.contact.release();
     start = s.shape.coefficients;
@@ -299,12 +308,34 @@ void follow_in_contact(RadialState& s, Index iterations, double tolerance,
     s.report.iterations = s.report.evaluations = 0;
   }
   if (start.size() > 0) {
-    approach(s, before, 1, iterations, tolerance, progress);
+    approach(s, before, 1, 0, iterations, tolerance, progress);
     if (!s.contact.overlaps(s.shape.coefficients)) return report_contact(s);
     back_to(s, start);
+    slowly = s.in_one_go;
   }
-  const auto parts = static_cast<Index>(std::ceil(way / length));
-  approach(s, before, std::clamp<Index>(parts, 1, most_steps), iterations, tolerance, progress);
+  const RowMatrix<double> begun = s.shape.coefficients;
+  const auto approach_at = [&](const Pace& pace) {
+    const auto parts = static_cast<Index>(std::ceil(way / length(pace)));
+    approach(s, before, std::clamp<Index>(parts, 1, pace.most_steps), pace.iterations, iterations, tolerance,
+             progress);
+  };
+  approach_at(usual);
+  if (slowly && way > length(small)) {
+    const auto badness = [&] {
+      const bool inside = s.contact.deepest_outside() > nearly || s.contact.overlaps(s.shape.coefficients);
+      return std::pair(inside, value_without_contact(s));
+    };
+    const std::pair<bool, double> bad = badness();
+    const RowMatrix<double> there = s.shape.coefficients;
+    ContactPressing pressing = s.contact.pressing();
+    back_to(s, begun);
+    approach_at(small);
+    if (bad < badness()) {
+      back_to(s, there);
+      s.contact.set_pressing(std::move(pressing));
+      s.contact.find(s.shape.coefficients);
+    }
+  }
   report_contact(s);
 }
 

@@ -136,7 +136,8 @@ void RadialSolver::set_symmetry(SymmetryPlane symmetry, const Progress& progress
   *this = std::move(next);
 }
 
-void RadialSolver::set_contact(const std::optional<Contact>& contact) {
+void RadialSolver::set_contact(const std::optional<Contact>& contact, bool in_one_go) {
+  state_->in_one_go = in_one_go;
   const ThreadScope threads(state_->problem.options.threads);
   state_->contact.set(contact, state_->shape.coefficients);
 }

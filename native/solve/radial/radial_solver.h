@@ -49,8 +49,9 @@ class ARAPFIELDS_EXPORT RadialSolver {
   /// Energies that join the solver's own, and an observer of its steps.
   void set_hooks(const RadialHooks& hooks);
   /// What the surface does not pass from the next solve on; none: nothing. Throws InvalidInput as
-  /// require_contact() does, and with exact handles.
-  void set_contact(const std::optional<Contact>& contact);
+  /// require_contact() does, and with exact handles. `in_one_go`: handles jump to where they end, so that a
+  /// solve takes them there in small steps where a drag would have.
+  void set_contact(const std::optional<Contact>& contact, bool in_one_go = false);
   /// Moves the handles' targets.
   void set_targets(const std::vector<Handle>& moved);
   /// Improves the field for the current targets and style; 0 iterations or tolerance: the options'.

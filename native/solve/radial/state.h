@@ -74,8 +74,7 @@ struct RadialState {
   template <class Scalar>
   QuasiNewtonReport descend(RadialPrecision<Scalar>& precision, const QuasiNewtonOptions& how,
                             const Progress& progress);
-  /// A drag goes on as it went: starts one step further along the last change where that is better. Returns
-  /// where it would have started else.
+  /// Starts one step further along a drag's last change where that is better. Returns where it would have.
   SolveHistory::Start extrapolate();
   /// Measures the report in this precision.
   template <class Scalar>
@@ -99,6 +98,7 @@ struct RadialState {
     Points targets;                  ///< the handles'
     RowMatrix<double> coefficients;  ///< of what they made
   } tried;                           ///< where a solve without contact was tried last
+  bool in_one_go = false;            ///< no smaller steps of the handles come before a solve
   RadialHooks hooks;
   Revision hooks_revision = 0;
   RadialPreconditioner preconditioner;
