@@ -27,7 +27,7 @@ std::pair<Points, Points> cone() {
 
 }  // namespace
 
-BOOST_AUTO_TEST_SUITE(standing_out)
+BOOST_AUTO_TEST_SUITE(standing_out_of_samples)
 
 BOOST_AUTO_TEST_CASE(a_tip_stands_out_of_a_cone_and_its_sides_do_not) {
   const auto [samples, normals] = cone();
