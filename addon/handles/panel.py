@@ -26,16 +26,8 @@ class ARAPFIELDS_UL_handles(bpy.types.UIList):
         swatch = row.row()
         swatch.ui_units_x = 0.8
         swatch.prop(item, "colour", text="")
-        if item.kind == "BONE":
-            row.prop(
-                item.rig.data.bones[movers.bone_of(item)],
-                "name",
-                text="",
-                emboss=False,
-                icon=ICONS[item.kind],
-            )
-        else:
-            row.prop(item.empty, "name", text="", emboss=False, icon=ICONS[item.kind])
+        named = item.rig.data.bones[movers.bone_of(item)] if item.kind == "BONE" else item.empty
+        row.prop(named, "name", text="", emboss=False, icon=ICONS[item.kind])
         if item.kind in empties.PINS:
             row.prop(item, "anchor", text="", emboss=False, **anchor_icon(item))
         if item.inside >= 0:

@@ -63,8 +63,7 @@ class Drag:
         self.reach, self.kind = pins.entry_of(empty).reach, pins.entry_of(empty).kind
         self.values = {name: tuple(getattr(empty, name)) for name in TRANSFORMS}
         source = before.source.get()
-        if not sessions.follows_handles(source):
-            sessions.begin(context, source, kind_of(source), keeps_shape=True)
+        begin_live(context, source)
         sessions.live[source.session_uid].keeps_shape = True
 
     def move(self, context, location):
@@ -148,6 +147,12 @@ def insert_keys(context, empty):
         turn = {"QUATERNION": "quaternion", "AXIS_ANGLE": "axis_angle"}.get(empty.rotation_mode, "euler")
         for path in ("location", f"rotation_{turn}"):
             empty.keyframe_insert(path)
+
+
+def begin_live(context, source):
+    """Makes a source live, unless its shape follows handles already."""
+    if not sessions.follows_handles(source):
+        sessions.begin(context, source, kind_of(source), keeps_shape=True)
 
 
 def kind_of(source):

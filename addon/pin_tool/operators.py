@@ -169,8 +169,7 @@ class ARAPFIELDS_OT_pin_turn(PinOperator, bpy.types.Operator):
             return {"PASS_THROUGH"}
         source = owner_of(empty)
         try:
-            if not sessions.follows_handles(source):
-                sessions.begin(context, source, drag.kind_of(source), keeps_shape=True)
+            drag.begin_live(context, source)
         except (UserError, ValueError) as error:
             return self.refuse(error)
         sessions.live[source.session_uid].keeps_shape = True

@@ -11,16 +11,6 @@ import arapfields as af
 LANDMARKS_MET = 0.1
 
 
-@pytest.fixture(scope="module")
-def figure():
-    return cases.figure(3)
-
-
-@pytest.fixture(scope="module")
-def samples(figure):
-    return af.sample_mesh(*figure, 1500)
-
-
 def test_landmarks_are_met_where_the_surface_slides_along_itself():
     """An egg onto itself, by pairs that are twisted about its axis: only they tell."""
     v, f = cases.sphere(1.0, 3)

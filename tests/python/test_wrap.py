@@ -11,16 +11,6 @@ import arapfields as af
 FOUND_AGAIN = 0.5
 
 
-@pytest.fixture(scope="module")
-def figure():
-    return cases.figure(3)
-
-
-@pytest.fixture(scope="module")
-def samples(figure):
-    return af.sample_mesh(*figure, 1500)
-
-
 @pytest.mark.parametrize("landmarks", [0, 4])
 def test_a_moved_scaled_and_bent_shape_is_found_again(figure, samples, landmarks):
     v, f = figure
