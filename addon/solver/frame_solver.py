@@ -105,7 +105,7 @@ class FrameSolver:
         self.handle_count = len(held)
         return held
 
-    def apply_request(self, request):
+    def apply_request(self, request, task=None):
         """Has the native solver know all of a request but where its handles are; returns that."""
         if request.points is not self.points and self.sampled.topology is None:
             self.set_points(request.points, self.sampled.setup.surface.space.to_solve(request.points))
@@ -120,32 +120,32 @@ class FrameSolver:
             weights = self.sampled.region
             self.solver.set_style(directions, strength, sharpness=sharpness, weights=weights, up=up)
         if request.contact_key != self.contact_key:
+            self.solver.set_contact(native_contact(request.contact, self.distances), task=task)
             self.contact_key = request.contact_key
-            self.solver.set_contact(native_contact(request.contact, self.distances))
         if request.motion != self.motion:
-            self._set_motion(request.motion)
+            self._set_motion(request.motion, task)
+            self.motion = request.motion
         # The last, of what is far from all pins, is no handle where nothing is.
         return request.targets[: self.handle_count] if request.handles else None
 
-    def _set_motion(self, motion):
-        self.motion = motion
+    def _set_motion(self, motion, task):
         if motion is None:
             self.solver.set_secondary_motion(None)
             return
         options = options_of("secondary", dict(motion.options), self.sampled.setup.machine)
         further = {"masses": self.sampled.masses, "up": motion.up, "ground": motion.ground}
-        self.solver.set_secondary_motion(options, **further)
+        self.solver.set_secondary_motion(options, **further, task=task)
 
-    def follow(self, request, **options):
+    def follow(self, request, task=None, **options):
         """Goes on towards a request from the shape before; returns the steps that were taken."""
-        return self.solver.follow(self.apply_request(request), **options)
+        return self.solver.follow(self.apply_request(request, task), task=task, **options)
 
     def step(self, request, seconds, earlier, state=None, task=None):
         """Integrates secondary motion over so many seconds; `earlier` is the motion of the request before.
 
         `state`: the native state to begin with, in place of that of the step before.
         """
-        targets = self.apply_request(request)
+        targets = self.apply_request(request, task)
         if state is not None:
             self.solver.motion_state = state
         coordinates = request.motion.coordinates_since(earlier)
@@ -153,7 +153,7 @@ class FrameSolver:
 
     def solve_from_rest(self, request, task=None):
         """The request's own shape, whatever was solved before it: the same bits on any thread."""
-        self.apply_request(request)  # before it is at rest: obstacles then begin where they are
+        self.apply_request(request, task)  # before it is at rest: obstacles then begin where they are
         self.solver.reset()
         self.follow(request, iterations=REST_STEPS, tolerance=FINE_TOLERANCE, task=task)
         return replace(self.exact_shape(request), of=request)

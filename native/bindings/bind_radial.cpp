@@ -129,16 +129,16 @@ RadialFieldResult step(Live& live, const std::optional<ArraysArgument>& targets,
 
 void set_secondary_motion(Live& live, const std::optional<SecondaryMotionOptions>& options,
                           const std::optional<ArrayArgument>& masses, const std::optional<ArrayArgument>& up,
-                          const std::optional<double>& ground) {
+                          const std::optional<double>& ground, Task* task) {
   std::optional<SecondaryMotion> motion;
   if (options) {
-    motion = SecondaryMotion{*options};
-    if (masses) motion->masses = as_vector(*masses, "masses");
+    motion = SecondaryMotion{*options, as_vector(masses, "masses")};
     if (up) motion->up = as_vec3(*up, "up");
     motion->ground = ground;
   }
-  run_alone(live, nullptr,
-            [&](RadialSolver& solver, const Progress&) { solver.set_secondary_motion(motion); });
+  run_alone(live, task, [&](RadialSolver& solver, const Progress& progress) {
+    solver.set_secondary_motion(motion, progress);
+  });
 }
 
 void set_style(Live& live, const std::optional<NormalsArgument>& normals, double strength, double sharpness,
@@ -208,7 +208,8 @@ may call it: one at a time works, the others wait.)")
              const auto held = as_handles(handles);
              return run_long(task, [&](const Progress& progress) {
                auto live = std::make_unique<Live>(samples, held, options, progress);
-               live->run(progress, [&](RadialSolver& solver) { solver.set_contact(contact); });
+               live->run(progress,
+                         [&](RadialSolver& solver) { solver.set_contact(contact, false, progress); });
                return live;
              });
            }),
@@ -286,7 +287,7 @@ Turns the surface towards preferred normals from the next solve on.
 lowest sample along `up` (3,), z unless given.)")
       .def("set_secondary_motion", &set_secondary_motion,
            py::arg_v("options", SecondaryMotionOptions(), "SecondaryMotionOptions()"), py::kw_only(),
-           "masses"_a = py::none(), "up"_a = py::none(), "ground"_a = py::none(), R"(
+           "masses"_a = py::none(), "up"_a = py::none(), "ground"_a = py::none(), "task"_a = py::none(), R"(
 Gives the surface a mass from the next step() on: it lags behind its handles, overshoots and settles.
 
 `masses` ≥ 0, one for each sample given to the constructor, distribute the mass; 0 follows at once. Gravity
@@ -294,11 +295,13 @@ points against `up` (3,), z unless given. `ground` is a height along `up` that t
 solve() finds the rest state. None or strength 0: no mass.)")
       .def(
           "set_contact",
-          [](Live& live, const std::optional<Contact>& contact) {
-            run_alone(live, nullptr,
-                      [&](RadialSolver& solver, const Progress&) { solver.set_contact(contact); });
+          [](Live& live, const std::optional<Contact>& contact, Task* task) {
+            run_alone(live, task, [&](RadialSolver& solver, const Progress& progress) {
+              solver.set_contact(contact, false, progress);
+            });
           },
-          "contact"_a, "What the surface does not pass from the next solve on; None: nothing.")
+          "contact"_a, py::kw_only(), "task"_a = py::none(),
+          "What the surface does not pass from the next solve on; None: nothing.")
       .def("step", &step, "targets"_a, "seconds"_a, py::kw_only(), "coordinates"_a = py::none(),
            "task"_a = py::none(), R"(
 Moves the handles to `targets` within `seconds` (1e-5 to 10) and integrates the surface's motion.

@@ -45,7 +45,8 @@ std::pair<Vec3, double> out_of_hull(const Points& arms, double enough) {
 }  // namespace
 
 std::vector<Index> standing_out(PointsIn points, PointsIn samples, PointsIn normals, double spacing,
-                                double least, Index most) {
+                                double least, Index most, const Progress& progress) {
+  const CancelScope scope(progress);
   const OrientedPoints tree(samples, Points::Zero(samples.rows(), 3));
   Points ways(points.rows(), 3);  // out of the samples
   Vector heights = Vector::Zero(points.rows()), reaches(points.rows());
@@ -77,6 +78,7 @@ std::vector<Index> standing_out(PointsIn points, PointsIn samples, PointsIn norm
   std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return heights[a] > heights[b]; });
   for (const Index i : order) {
     if (std::ssize(chosen) == most) break;
+    progress.check();
     const bool covered = std::any_of(chosen.begin(), chosen.end(), [&](Index k) {
       const Vec3 arm = (points.row(i) - points.row(k)).transpose();
       return ways.row(i).dot(arm) <= least && arm.squaredNorm() < reaches[i] * reaches[i];

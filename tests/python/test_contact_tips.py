@@ -81,3 +81,18 @@ def test_no_vertex_at_a_tip_is_inside(name, function):
         assert lowest > -DEEPEST * size
         assert min(lowest, sample) < 2 * DEEPEST * size  # it stands there
         assert shape.report.flipped_share < FLIPPED
+
+
+def test_a_cancelled_contact_is_as_if_it_had_not_been_asked_for():
+    vertices, triangles = SHAPES["urchin"]()
+    samples = af.sample_mesh(vertices, triangles, COUNT, seed=0)
+    live, free = (af.LiveDeformer(samples, [af.Cuboid(TOP, TOP)], QUICK) for _ in range(2))
+    way = turned(0, shift=(0, 0, WAY)) @ TOP
+    task = af.Task()
+    task.cancel()
+    with pytest.raises(af.Cancelled):
+        live.set_contact(contact(None), task=task)
+    assert np.array_equal(live.solve([way])(vertices), free.solve([way])(vertices))
+    live.set_contact(contact(None))
+    moved = live.solve([way], iterations=30)(vertices)
+    assert outside(None, moved).min() > -DEEPEST * np.ptp(vertices, axis=0).max()

@@ -4,25 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "core/decompositions.h"
 #include "core/jacobians.h"
-#include "core/random.h"
 #include "core/unit_rows.h"
-#include "sampling/oriented_points.h"
 #include "sampling/sample_choice.h"
-#include "sampling/standing_out.h"
 
 namespace arapfields {
 namespace {
 
-/// Samples that are followed at most; they lie denser than any detail of a radial field.
-constexpr Index most_samples = 20000;
-/// Vertices of the mesh that stand farther out of the samples, in cube units, are followed, so many at most:
-/// less is within the distance that contact keeps.
-constexpr double stands_out = 1e-3;
-constexpr Index most_vertices = 4000;
 /// Finer places at most: of the edges that touch, more would say nothing new.
 constexpr Index most_finer = 12000;
 /// Finer places lie so many times as dense, and a sample stands for places up to so many spacings away.
@@ -36,34 +26,17 @@ constexpr Index least_fitted = 5;
 
 }  // namespace
 
-void ContactPoints::choose() {
+void ContactPoints::choose(const Progress& progress) {
   if (!samples_.empty()) return;
-  Random random(static_cast<std::uint64_t>(problem_.options.seed), 3);
-  samples_ = stratified(problem_.shape->order, std::min(most_samples, problem_.samples.size()), random);
-  rest_ = rows_of(problem_.surface(), samples_);
-  const double wide = 0.05;  // a cell holds about a square of the surface
-  const PointGrid coarse(rest_, wide);
-  spacing_ = wide * std::sqrt(static_cast<double>(coarse.size()) / static_cast<double>(rest_.rows()));
+  const auto followed = problem_.shape->followed(problem_.samples, progress);
+  samples_ = followed->samples;
+  parents_ = followed->parents;
+  rest_ = followed->rest;
+  spacing_ = followed->spacing;
   near_.resize(samples_.size());
   is_fine_.assign(samples_.size(), false);
-  add_vertices();
   embedded_ = embedded_at(rest_);
   coarse_ = rest_.rows();
-}
-
-void ContactPoints::add_vertices() {
-  if (!problem_.samples.mesh) return;
-  const TriangleMesh& mesh = *problem_.samples.mesh;
-  std::vector<Index> rows(samples_.size());
-  std::iota(rows.begin(), rows.end(), Index{0});
-  const Points vertices = problem_.frame().to_cube(used_vertices(mesh.vertices, mesh.triangles));
-  const Points found =
-      rows_of(vertices, standing_out(vertices, rest_, normals(rows), spacing_, stands_out, most_vertices));
-  const Points alike = Points::Zero(std::max(rest_.rows(), found.rows()), 3);
-  parents_ =
-      OrientedPoints(rest_, alike.topRows(rest_.rows())).nearest(found, alike.topRows(found.rows()), 0.0);
-  rest_.conservativeResize(rest_.rows() + found.rows(), Eigen::NoChange);
-  rest_.bottomRows(found.rows()) = found;
 }
 
 Index ContactPoints::sample_of(Index row) const {

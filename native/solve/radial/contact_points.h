@@ -15,8 +15,8 @@ namespace arapfields {
 class ContactPoints {
  public:
   explicit ContactPoints(const RadialProblem& problem) : problem_(problem) {}
-  /// Chooses the samples, once.
-  void choose();
+  /// Takes the places of the rest shape, once. Throws Cancelled.
+  void choose(const Progress& progress = {});
   bool empty() const { return samples_.empty(); }
   /// Rows of the problem's samples that are followed.
   const std::vector<Index>& samples() const { return samples_; }
@@ -53,7 +53,6 @@ class ContactPoints {
   Points normals_at(const RowMatrix<double>& coefficients, const std::vector<Index>* blocks = nullptr);
 
  private:
-  void add_vertices();
   Points finer(Index sample);
   Points embedded_at(PointsIn places) const;
 

@@ -19,6 +19,7 @@ class ContactTerms {
   /// Distance beyond each margin, in cube units: what solves leave of a depth is within.
   static constexpr double kept = 1.5e-3;
   explicit ContactTerms(const RadialProblem& problem) : problem_(problem), points_(problem) {}
+  void prepare(const Progress& progress) { points_.choose(progress); }  ///< what takes long of set()
   /// Obstacles that only move or change stay where they were until move_obstacles(). Throws InvalidInput.
   void set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients);
   /// A ground beside that of the contact; whether it is another one than before.

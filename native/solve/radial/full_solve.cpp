@@ -161,13 +161,13 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
     few.handle_weight = (exact != nullptr ? followed_closely(options) : options).handles.handle_weight;
     few.tolerance = LiveOptions().tolerance;
     RadialSolver solver(samples, handles, few, progress.part(0.0, 0.1), shape);
-    solver.set_contact(hooks.contact, true);
+    solver.set_contact(hooks.contact, true, progress);
     first = solver.solve(std::min(first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
     progress.preview([&](PointsIn points) { return around(first)->at(points); });
   }
   const double done = first ? 0.15 : 0.0;
   RadialSolver solver(samples, handles, fine, progress.part(done, 0.4), shape, blend);
-  solver.set_contact(hooks.contact, true);
+  solver.set_contact(hooks.contact, true, progress);
   if (first) solver.adopt(*first);
   const Shown shown = [&] { return around(solver.field()); };
   LoopResult loop =
@@ -218,13 +218,13 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   few.fine_centers = style_first_centers;
   few.coarse_centers = few.fine_centers / 5;
   RadialSolver quick(samples, handles, few, progress.part(0.0, 0.1), shape);
-  quick.set_contact(hooks.contact, true);
+  quick.set_contact(hooks.contact, true, progress);
   quick.set_style(style, options.strength, options.sharpness, weights, up);
   const std::shared_ptr<const RadialField> first =
       quick.solve(std::min(style_first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
   progress.preview([&](PointsIn points) { return first->at(points); });
   RadialSolver solver(samples, handles, live, progress.part(0.15, 0.3), shape);
-  solver.set_contact(hooks.contact, true);
+  solver.set_contact(hooks.contact, true, progress);
   solver.set_style(style, options.strength, options.sharpness, weights, up);
   const Shown shown = [&] { return solver.field(); };
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity,

@@ -212,9 +212,11 @@ void change_coordinates(RadialState& s, const Mat4& motion) {
 
 }  // namespace
 
-void RadialSolver::set_secondary_motion(const std::optional<SecondaryMotion>& motion) {
+void RadialSolver::set_secondary_motion(const std::optional<SecondaryMotion>& motion,
+                                        const Progress& progress) {
   RadialState& s = *state_;
   const ThreadScope threads(s.problem.options.threads);
+  if (motion && motion->ground) s.contact.prepare(progress);
   s.dynamics.set(motion);
   std::optional<Ground> ground;
   if (s.dynamics.has_mass() && motion->ground) ground = Ground{*motion->ground, motion->up};

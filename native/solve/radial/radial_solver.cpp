@@ -128,17 +128,19 @@ void RadialSolver::set_symmetry(SymmetryPlane symmetry, const Progress& progress
   if (const auto& request = s.style.request())
     next.set_style(request->style, request->strength, request->sharpness, request->weights, request->up);
   next.set_hooks(s.hooks);
-  next.set_secondary_motion(s.dynamics.motion());
-  next.set_contact(s.contact.contact());
+  next.set_secondary_motion(s.dynamics.motion(), progress);
+  next.set_contact(s.contact.contact(), s.in_one_go, progress);
   next.adopt(*field());
   if (s.tracked.size() > 0) next.track(s.tracked.rest());
   next.state_->report.setup_seconds += s.report.setup_seconds;
   *this = std::move(next);
 }
 
-void RadialSolver::set_contact(const std::optional<Contact>& contact, bool in_one_go) {
-  state_->in_one_go = in_one_go;
+void RadialSolver::set_contact(const std::optional<Contact>& contact, bool in_one_go,
+                               const Progress& progress) {
   const ThreadScope threads(state_->problem.options.threads);
+  if (contact && contact->any()) state_->contact.prepare(progress);
+  state_->in_one_go = in_one_go;
   state_->contact.set(contact, state_->shape.coefficients);
 }
 

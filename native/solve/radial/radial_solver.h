@@ -49,9 +49,10 @@ class ARAPFIELDS_EXPORT RadialSolver {
   /// Energies that join the solver's own, and an observer of its steps.
   void set_hooks(const RadialHooks& hooks);
   /// What the surface does not pass from the next solve on; none: nothing. Throws InvalidInput as
-  /// require_contact() does, and with exact handles. `in_one_go`: handles jump to where they end, so that a
-  /// solve takes them there in small steps where a drag would have.
-  void set_contact(const std::optional<Contact>& contact, bool in_one_go = false);
+  /// require_contact() does, and with exact handles; Cancelled, and then nothing has changed. `in_one_go`:
+  /// handles jump to where they end, so that a solve takes them there in small steps where a drag would have.
+  void set_contact(const std::optional<Contact>& contact, bool in_one_go = false,
+                   const Progress& progress = {});
   /// Moves the handles' targets.
   void set_targets(const std::vector<Handle>& moved);
   /// Improves the field for the current targets and style; 0 iterations or tolerance: the options'.
@@ -61,7 +62,7 @@ class ARAPFIELDS_EXPORT RadialSolver {
   Index follow(Index iterations = 0, double tolerance = 0.0, const Progress& progress = {});
   /// Gives the surface a mass from the next step on; none, or strength 0: no mass. solve() finds the
   /// equilibrium. Throws InvalidInput for numbers out of range, and if all masses are zero.
-  void set_secondary_motion(const std::optional<SecondaryMotion>& motion);
+  void set_secondary_motion(const std::optional<SecondaryMotion>& motion, const Progress& progress = {});
   /// Moves the handles to other targets in so many seconds (1e-5 to 10), and the surface with them. It starts
   /// where the last step or solve ended; a solve ends with zero velocity. `coordinates` takes coordinates of
   /// the last step to those of this one, where the object itself has moved rigidly: the surface feels it.

@@ -19,7 +19,8 @@ constexpr std::uint64_t stream = 2;
 }  // namespace
 
 RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed, int axis,
-                     const MayJoin& may_join) {
+                     const MayJoin& may_join)
+    : seed_(seed) {
   require_samples(samples);
   order = canonical_order(samples.points);
   thickness = std::make_shared<const LocalThickness>(samples.points, samples.normals, order);
@@ -42,6 +43,14 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
   if (!interior || normals.rows() == 0) return;
   const MayJoin sites_may_join = [&](Index i, Index j) { return may_join(chosen[i], chosen[j]); };
   embedding = interior_embedding(sites, normals, axis, may_join ? sites_may_join : MayJoin());
+}
+
+std::shared_ptr<const FollowedPlaces> RestShape::followed(const SurfaceSamples& samples,
+                                                          const Progress& progress) const {
+  return followed_.run(progress, [&](std::shared_ptr<const FollowedPlaces>& made) {
+    if (!made) made = std::make_shared<const FollowedPlaces>(samples, order, seed_, progress);
+    return made;
+  });
 }
 
 }  // namespace arapfields

@@ -5,10 +5,12 @@
 #include <memory>
 #include <vector>
 
+#include "core/one_at_a_time.h"
 #include "fields/radial_basis.h"
 #include "mesh/surface_samples.h"
 #include "options/choices.h"
 #include "sampling/local_thickness.h"
+#include "solve/radial/followed_places.h"
 
 namespace arapfields {
 
@@ -21,11 +23,19 @@ struct RestShape {
   RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed, int axis = -1,
             const MayJoin& may_join = {});
 
+  /// What contact follows of these samples, chosen when it is first asked for. Throws Cancelled.
+  std::shared_ptr<const FollowedPlaces> followed(const SurfaceSamples& samples,
+                                                 const Progress& progress) const;
+
   std::vector<std::uint32_t> order;  ///< the samples, neighbours beside each other
   std::shared_ptr<const LocalThickness> thickness;
   Points sites;         ///< (n,3) samples that centers are chosen from; folded where there is an axis
   RadialLayout layout;  ///< how dense centers stand there, and what is below
   std::shared_ptr<const InteriorEmbedding> embedding;  ///< null where straight distances serve
+
+ private:
+  std::uint64_t seed_;
+  mutable OneAtATime<std::shared_ptr<const FollowedPlaces>> followed_;
 };
 
 /// 0, 1 or 2; −1 for none.
