@@ -49,6 +49,8 @@ class WrapFlow {
   const Points& landmarks() const { return landmarks_; }
   /// Mean ‖J − R‖² of some samples.
   double stretch() const;
+  /// Mean distance of the samples to the target, in the source's cube.
+  double distance() const;
 
  private:
   struct StepSamples;

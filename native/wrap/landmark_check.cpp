@@ -38,8 +38,10 @@ constexpr double medians = 2.5, least_far = 0.08, most_far = 0.13;
 /// One that was left out is right all the same where a wrap without it brings it as near.
 constexpr double near_anyway = 0.03;
 /// It returns if a wrap that pulls firmly brings it within as many medians, or so near, and the stretch grows
-/// by no more than this; where it is farther away without, it is not tried (tuned).
+/// by no more than this, or all of the surface comes this much nearer to the target; where it is farther away
+/// without, it is not tried (tuned).
 constexpr double firmly_near = 0.045, more_stretch = 1.1, least_stretch = 0.015, may_return = 0.35;
+constexpr double much_nearer = 0.8;
 /// Rounds of a wrap, and the factor by which a mirror image must fit better.
 constexpr int rounds = 4;
 constexpr double mirrored_gain = 2.0;
@@ -116,6 +118,7 @@ std::vector<Placement> distinct(const std::vector<Placement>& all) {
 struct Trial {
   Vector distances;
   double stretch = 0.0;
+  double distance = 0.0;  // of the surface to the target
 };
 
 /// Which pairs agree, by wraps from one placement.
@@ -173,7 +176,7 @@ class Vote {
                   static_cast<std::uint64_t>(options_.seed));
     flow.run(options_, progress_);
     return {(at.of(flow.landmarks()) - source_.landmark_targets).rowwise().norm() / target_.diagonal,
-            flow.stretch()};
+            flow.stretch(), at.scale * flow.distance() / target_.diagonal};
   }
   Similarity fit(const std::vector<Index>& rows, double scale) const {
     const WrapSource some = source_.with_landmarks(rows);
@@ -209,7 +212,7 @@ class Vote {
   }
 
   /// A pair that others had pushed away, or the pose, returns where a firm pull reaches it without more
-  /// stretch: to reach a wrong place, the surface must stretch.
+  /// stretch, or brings the surface nearer to the target: to reach a wrong place, it stretches and leaves it.
   void take_back(const Similarity& at, std::vector<Index>& kept, Trial& trial) const {
     std::vector<Index> away;
     for (Index row = 0; row < trial.distances.size(); ++row)
@@ -222,8 +225,10 @@ class Vote {
       more.insert(std::ranges::upper_bound(more, row), row);
       Trial with = tried(at, more, firm_pull);
       const double far = limit(with, more);
-      if (with.stretch > more_stretch * trial.stretch + least_stretch ||
-          with.distances[row] >= std::max(firmly_near, spread(with, more)) ||
+      const bool is_cheap = with.stretch <= more_stretch * trial.stretch + least_stretch;
+      const bool is_nearer = with.distance <= much_nearer * trial.distance;
+      if (!(is_cheap || is_nearer) ||
+          with.distances[row] >= std::max(is_nearer ? least_far : firmly_near, spread(with, more)) ||
           std::ranges::any_of(more, [&](Index one) { return with.distances[one] >= far; }))
         continue;
       kept = std::move(more);

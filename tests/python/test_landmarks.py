@@ -9,6 +9,8 @@ import arapfields as af
 
 # Landmarks are met, in % of the target's diagonal: far below what a click is off.
 LANDMARKS_MET = 0.1
+# The same of a tip that turns by more than half a circle under a few centers.
+TIP_MET = 0.5
 
 
 def test_landmarks_are_met_where_the_surface_slides_along_itself():
@@ -107,6 +109,18 @@ def test_a_landmark_on_a_round_back_is_not_blamed_for_what_another_says(figure, 
     options = af.WrapOptions(centers=20, stages=1, iterations=1)
     report = af.wrap(samples, af.MeshSdf(target_v, f), pairs, options).report
     assert set(report.left_out) <= {liar}
+
+
+@pytest.mark.parametrize(("curl", "target_curl"), [(2.2, -1.5), (3.0, -1.0)])
+def test_a_landmark_that_unbends_a_tail_is_followed(curl, target_curl):
+    """It costs much stretch, and takes the whole tail onto the target's."""
+    v, f, ends = cases.tailed(curl)
+    target_v, _, _ = cases.tailed(target_curl)
+    pairs = list(zip(v[ends], target_v[ends], strict=True))
+    report = af.wrap(
+        af.sample_mesh(v, f, 1500), af.MeshSdf(target_v, f), pairs, af.WrapOptions(**cases.SMALL)
+    ).report
+    assert not report.left_out and max(report.landmarks) < TIP_MET / 100 * report.diagonal
 
 
 def test_landmarks_of_which_most_lie_are_not_followed_without_a_word(figure, samples):

@@ -29,6 +29,36 @@ def star():
     return v, f, np.array(ends + [np.linalg.norm(v - place, axis=1).argmin() for place in beside])
 
 
+def tailed(curl, rings=80, around=16):
+    """(n, 3), (m, 3), (8,): a body with two humps whose thin tail bends by this angle; vertices at its nose,
+    the tail's tip and six places between."""
+    along = np.linspace(0, 1, rings)
+    turn = curl * np.clip((along - 0.62) / 0.38, 0, 1)
+    ahead = np.stack([np.cos(turn), np.zeros(rings), np.sin(turn)], 1)
+    middle = np.cumsum(ahead, 0) * 1.6 / rings
+    aside = np.stack([-ahead[:, 2], np.zeros(rings), ahead[:, 0]], 1)
+    radius = np.interp(
+        along, [0, 0.06, 0.12, 0.3, 0.5, 0.58, 0.95, 1], [0.03, 0.05, 0.12, 0.16, 0.13, 0.05, 0.035, 0.02]
+    )
+    angle = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    for place, size, way in ((0.25, 0.5, 0.0), (0.45, 0.4, 2.0)):
+        hump = np.exp(-(((along[:, None] - place) / 0.06) ** 2) - ((angle - way) / 0.6) ** 2)
+        radius = radius.reshape(rings, -1) * (1 + size * hump)
+    ring = np.cos(angle)[:, None] * aside[:, None] + np.sin(angle)[:, None] * np.array([0, 1, 0])
+    v = (middle[:, None] + radius[..., None] * ring).reshape(-1, 3)
+    first = np.arange((rings - 1) * around)
+    second = first - first % around + (first + 1) % around
+    f = [np.stack([first, first + around, second + around], 1), np.stack([first, second + around, second], 1)]
+    place, next_place = np.arange(around), np.roll(np.arange(around), -1)
+    nose, tip, last = len(v), len(v) + 1, (rings - 1) * around
+    f += [np.stack([np.full(around, nose), place, next_place], 1)]
+    f += [np.stack([np.full(around, tip), last + next_place, last + place], 1)]
+    v = np.concatenate([v, v[:around].mean(0)[None], v[-around:].mean(0)[None]])
+    on_body = [round(rings * share) * around + k for share, k in ((0.25, 0), (0.25, 4), (0.25, 12))]
+    on_body += [round(rings * share) * around + k for share, k in ((0.45, 5), (0.5, 0), (0.52, 8))]
+    return v, np.concatenate(f).astype(np.int32), np.array([nose, tip, *on_body])
+
+
 def doll(head, body):
     """A ball with a nose on another one with feet, of these radii; it looks along -y."""
     balls = [(body, (0, 0, 0)), (head, (0, 0, 0.8)), (0.12, (0, -head, 0.8))]
