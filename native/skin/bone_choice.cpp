@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <numeric>
 
 namespace arapfields {
 namespace {
@@ -16,17 +15,23 @@ constexpr double distance_weight = 2e-6;
 }  // namespace
 
 BoneChoice::BoneChoice(const RigShape& rig, Index node,
-                       const Eigen::Ref<const Eigen::Matrix<float, 1, Eigen::Dynamic>>& distances) {
+                       const Eigen::Ref<const Eigen::Matrix<float, 1, Eigen::Dynamic>>& distances, int side,
+                       double share)
+    : share_(share) {
   const Skeleton& skeleton = rig.skeleton;
-  std::vector<Index> all(skeleton.count());
-  std::iota(all.begin(), all.end(), Index{0});
-  const Index most = std::min<Index>(most_candidates, skeleton.count());
+  const auto is_other = [&](Index b) { return rig.sides[b] * side < 0; };
+  std::vector<Index> all;
+  for (Index b = 0; b < skeleton.count(); ++b)
+    if (share > 0.0 || !is_other(b)) all.push_back(b);
+  const Index most = std::min<Index>(most_candidates, static_cast<Index>(all.size()));
   std::ranges::partial_sort(all, all.begin() + most, {}, [&](Index b) { return distances[b]; });
   const float least = std::max(distances[all.front()], static_cast<float>(rig.spacing));
   for (Index k = 0; k < most; ++k)
     if (distances[all[k]] < farthest_share * least && rig.may_move(all[k], node, static_cast<double>(least)))
       bones.push_back(all[k]);
   if (bones.empty()) bones.push_back(all.front());
+  for (Index k = 0; k < count(); ++k)
+    if (is_other(bones[k])) others_.push_back(k);
   std::vector<double> costs;
   for (const Index b : bones) {
     const double farther = static_cast<double>(distances[b] / least) - 1.0;
@@ -41,6 +46,13 @@ BonePairs BoneChoice::square(const Vec3& rest, const std::vector<Mat4>& motions,
   for (Index k = 0; k < count(); ++k)
     off.col(k) = ((motions[bones[k]] * rest.homogeneous()).head<3>() - there) / extent;
   return off.transpose() * off;
+}
+
+BonePairs BoneChoice::held_back(const BonePairs& squares) const {
+  BonePairs result = squares;
+  for (const Index j : others_)
+    for (const Index k : others_) result(j, k) /= share_;
+  return result;
 }
 
 }  // namespace arapfields

@@ -9,8 +9,10 @@ namespace arapfields {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-/// In sizes of the shape: over this length before limbs part, bones of the other side lose their effect.
-constexpr double fade = 0.08;
+/// In sizes of the shape: over this length from where limbs part, bones of the other side lose their effect.
+constexpr double fade = 0.04;
+/// What would count by less does not count.
+constexpr double least_share = 0.01;
 /// The same for the depth of a gap between limbs that do not part.
 constexpr double gap_fade = 0.006;
 /// A sheet that runs on across the plane turns less than this.
@@ -78,8 +80,9 @@ std::vector<Limb> limbs_of(const RigShape& rig, const std::vector<Index>& roots,
 
 }  // namespace
 
-void keep_limbs_apart(const RigShape& rig, const PiecePoints& given, const std::vector<Index>& near,
-                      RowMatrix<float>& distances) {
+LimbSides::LimbSides(const RigShape& rig, const PiecePoints& given, const std::vector<Index>& near,
+                     const RowMatrix<float>& distances)
+    : sides(given.points.rows(), 0), shares(given.points.rows(), 1.0) {
   const Points &points = given.points, &normals = given.normals, &surface = rig.surface.points;
   if (std::ranges::all_of(rig.sides, [](int side) { return side == 0; })) return;
   const int axis = rig.symmetry.axis;
@@ -92,8 +95,8 @@ void keep_limbs_apart(const RigShape& rig, const PiecePoints& given, const std::
   for (Index i = 0; i < points.rows(); ++i) {
     // Parts that touch may cross the plane.
     if (const int own_side = rig.sides[rig.owners[near[i]]]; rig.cuts_itself() && own_side != 0) {
-      for (Index b = 0; b < rig.skeleton.count(); ++b)
-        if (rig.sides[b] == -own_side) distances(i, b) = std::numeric_limits<float>::infinity();
+      sides[i] = own_side;
+      shares[i] = 0.0;
       continue;
     }
     const double beyond = points(i, axis) - rig.symmetry.offset;
@@ -109,13 +112,13 @@ void keep_limbs_apart(const RigShape& rig, const PiecePoints& given, const std::
     double open = closed;
     if (limb.parting > -infinity) {
       const double same = (normals.row(i).dot(normal) - sheet_cosine) / (1.0 - sheet_cosine);
-      open = std::max((limb.parting - limb.along.dot(points.row(i))) / (fade * rig.extent),
+      open = std::max(1.0 + (limb.parting - limb.along.dot(points.row(i))) / (fade * rig.extent),
                       std::clamp(closed, 0.0, 1.0) * std::min(1.0, 2.0 * same));
     }
-    for (Index b = 0; b < rig.skeleton.count(); ++b)
-      if (rig.sides[b] * beyond < 0.0)
-        distances(i, b) = open > 0.0 ? distances(i, b) / static_cast<float>(std::min(open, 1.0))
-                                     : std::numeric_limits<float>::infinity();
+    open = std::clamp(open, 0.0, 1.0);
+    sides[i] = rig.sides[own];
+    const double share = open * open * (3.0 - 2.0 * open);
+    shares[i] = share < least_share ? 0.0 : share;
   }
 }
 

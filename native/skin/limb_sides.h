@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <vector>
+
 #include "skin/rig_shape.h"
 
 namespace arapfields {
 
-/// A leg does not move the other. Takes bones of the other side farther away, up to infinity, for points
-/// (n,3) that lie along a limb past the place where it parts from its twin, and that face the other across a
-/// gap. Where parts touch, each goes by the bone that it belongs to. `near` are the nodes that the points are
-/// nearest to; distances (n, bones), in units of the points.
-void keep_limbs_apart(const RigShape& rig, const PiecePoints& given, const std::vector<Index>& near,
-                      RowMatrix<float>& distances);
+/// A leg does not move the other. How much bones of the other side may move points (n,3): wholly where the
+/// limbs are joined; less and less along a limb from the place where it parts from its twin, then not at all,
+/// and not across a gap that the points face. Where parts touch, each goes by the bone that it belongs to.
+struct LimbSides {
+  /// `near` are the nodes that the points are nearest to; distances (n, bones), in units of the points.
+  LimbSides(const RigShape& rig, const PiecePoints& given, const std::vector<Index>& near,
+            const RowMatrix<float>& distances);
+
+  std::vector<int> sides;      ///< (n) of each point: −1 and 1; 0 where all bones count
+  std::vector<double> shares;  ///< (n) from 0 to 1
+};
 
 }  // namespace arapfields

@@ -83,12 +83,12 @@ RowMatrix<float> fitted_points(const RigShape& rig, const PiecePoints& given, co
   const VertexBlend blend(rig, given, near);
   const RigTwins mirror(rig, points);
   RowMatrix<float> nearby = blend(fitted.nodes), distances = blend(rig.bone_distances);
-  keep_limbs_apart(rig, given, near, distances);
   mirror.average(nearby);
   mirror.average(distances);
+  const LimbSides limbs(rig, given, near, distances);
   progress.report(0.93, "Weights");
   RowMatrix<float> result =
-      point_weights(rig, points, fitted.poses, nearby, distances, near, mirror, options);
+      point_weights(rig, points, fitted.poses, nearby, distances, near, limbs, mirror, options);
   mirror.average(result);
   return result;
 }

@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "core/parallel.h"
-#include "skin/limb_sides.h"
 
 namespace arapfields {
 namespace {
@@ -17,12 +16,11 @@ constexpr int sweeps = 20;
 
 WeightFit::WeightFit(const RigShape& rig)
     : rig_(rig), weights_(RowMatrix<float>::Zero(rig.size(), rig.skeleton.count())) {
-  RowMatrix<float> distances = rig.bone_distances;
   std::vector<Index> all(rig.size());
   std::iota(all.begin(), all.end(), Index{0});
-  keep_limbs_apart(rig, rig.nodes, all, distances);
+  const LimbSides limbs(rig, rig.nodes, all, rig.bone_distances);
   for (Index i = 0; i < rig.size(); ++i) {
-    choices_.emplace_back(rig, i, distances.row(i));
+    choices_.emplace_back(rig, i, rig.bone_distances.row(i), limbs.sides[i], limbs.shares[i]);
     squares_.push_back(BonePairs::Zero(choices_[i].count(), choices_[i].count()));
     weights_(i, choices_[i].bones.front()) = 1.0f;
   }
@@ -40,7 +38,7 @@ void WeightFit::add(const ExamplePose& pose) {
 void WeightFit::update(Index node, double smoothness) {
   const BoneChoice& choice = choices_[node];
   const double stiff = smoothness * smoothness_weight;
-  BonePairs h = squares_[node] * (rig_.trust[node] / static_cast<double>(poses_));
+  BonePairs h = choice.held_back(squares_[node]) * (rig_.trust[node] / static_cast<double>(poses_));
   h.diagonal().array() += stiff;
   FewBones g = -choice.penalties;
   for (Index j = 0; j < choice.count(); ++j)
@@ -71,13 +69,13 @@ Vector WeightFit::squared_errors(const ExamplePose& pose) const {
 
 RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::vector<ExamplePose>& poses,
                                const RowMatrix<float>& nearby, const RowMatrix<float>& distances,
-                               const std::vector<Index>& near, const RigTwins& mirror,
+                               const std::vector<Index>& near, const LimbSides& limbs, const RigTwins& mirror,
                                const SkinOptions& options) {
   RowMatrix<float> result = RowMatrix<float>::Zero(points.rows(), rig.skeleton.count());
   const double stiff = options.smoothness * smoothness_weight;
   parallel_for(0, points.rows(), 16, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i) {
-      const BoneChoice choice(rig, near[i], distances.row(i));
+      const BoneChoice choice(rig, near[i], distances.row(i), limbs.sides[i], limbs.shares[i]);
       const Index twin = mirror.twin(i), k = choice.count();
       BoneChoice other = choice;
       if (twin >= 0)
@@ -90,7 +88,7 @@ RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::
         };
         h += twin < 0 ? square(choice, i) : BonePairs(0.5 * (square(choice, i) + square(other, twin)));
       }
-      h *= rig.trust[near[i]] / static_cast<double>(poses.size());
+      h = choice.held_back(h) * (rig.trust[near[i]] / static_cast<double>(poses.size()));
       h.diagonal().array() += stiff;
       FewBones g = -choice.penalties;
       for (Index j = 0; j < k; ++j) g[j] += stiff * static_cast<double>(nearby(i, choice.bones[j]));

@@ -44,7 +44,7 @@ class WeightFit {
 /// points are nearest to.
 RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::vector<ExamplePose>& poses,
                                const RowMatrix<float>& nearby, const RowMatrix<float>& distances,
-                               const std::vector<Index>& near, const RigTwins& mirror,
+                               const std::vector<Index>& near, const LimbSides& limbs, const RigTwins& mirror,
                                const SkinOptions& options);
 
 }  // namespace arapfields
