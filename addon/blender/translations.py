@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Gives Blender the add-on's translations: each .po file in addon/translations is a language."""
 
+import functools
 import sys
 from pathlib import Path
 
@@ -23,6 +24,7 @@ def read_po(path):
     return {entry.msgid: entry.msgstr for entry in polib.pofile(str(path)).translated_entries()}
 
 
+@functools.cache
 def translations():
     """{language: {(context, English): translated}}."""
     languages = {}

@@ -15,6 +15,7 @@ if IN_BLENDER:
 
     import addon.deform.operators as deform
     from addon.core.runtime import jobs
+    from addon.core.runtime.coroutines import Pause
     from addon.properties.choices import RESULT_ITEMS
     from addon.results.placement import placement_refusal
 
@@ -140,7 +141,8 @@ def test_without_a_window_the_course_gives_what_blocking_gives():
     coroutine = operator.coroutine(bpy.context)
     while True:
         try:
-            next(coroutine)
+            if next(coroutine) is Pause.WORKER:
+                jobs.running().join(0.001)
         except StopIteration as ended:
             assert ended.value == {"FINISHED"}
             break

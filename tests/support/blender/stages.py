@@ -11,7 +11,7 @@ from support.blender.live import WAIT
 from addon import lifecycle
 from addon.animation.operators import ARAPFIELDS_OT_bake
 from addon.core.runtime import jobs
-from addon.core.runtime.coroutines import Pause
+from addon.core.runtime.coroutines import Pause, run_to_completion
 from addon.deform.operators import ARAPFIELDS_OT_deform
 from addon.live import sessions
 from addon.solver import setup
@@ -113,10 +113,7 @@ class Stage:
             self.coroutine.close()
             return "ended"
         try:
-            while True:
-                next(self.coroutine)
-        except StopIteration:
-            pass
+            run_to_completion(self.coroutine, wait=lambda: jobs.running().join(0.05))
         finally:
             jobs.stop()
         return " ".join(self.running.said)

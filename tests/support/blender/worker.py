@@ -16,7 +16,7 @@ from pathlib import Path
 
 import bpy
 
-SAMPLES = 1500  # a quarter of a live solver's own: these tests do not ask how well it solves
+SAMPLES = 500  # a twelfth of a live solver's own: these tests do not ask how well it solves
 
 
 @functools.cache
@@ -32,7 +32,7 @@ def run(order):
     from addon.solver import setup
 
     setup.SAMPLES = SAMPLES
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)  # preferences and other add-ons stay
     addon.register()
     try:
         arguments = order["arguments"]
@@ -50,6 +50,7 @@ def main():
     faulthandler.enable()  # a crash names the lines that every thread is at
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # what Blender prints must not pass for an answer
+    bpy.ops.wm.read_factory_settings(use_empty=True)
     for line in sys.stdin:
         print(json.dumps(run(json.loads(line))), file=answers, flush=True)
     if os.name == "nt":  # under Wine Blender's libraries may wait for ever for each other's threads
