@@ -61,7 +61,7 @@ def test_the_measures_measure():
 
 @pytest.mark.parametrize("style", QUICK)
 def test_a_dog_stands(style):
-    looks_right(*styled("dog", style, count=3000), style)
+    looks_right(*styled("dog", style, count=1200), style)
 
 
 @pytest.mark.slow

@@ -76,7 +76,7 @@ def ball(count=1000):
 
 def test_strength_means_the_same_for_all_styles():
     """Of what there is to turn on a ball, every style turns a like share; at one sharpness they do not."""
-    samples = ball()
+    samples = ball(count=400)
 
     def closed(style, **options):
         how = af.StylizeOptions(field="radial", iterations=40, strength=0.5, **options)
