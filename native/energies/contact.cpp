@@ -2,8 +2,17 @@
 #include "energies/contact.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace arapfields {
+namespace {
+
+/// Curvature of all but the planes, as a share of what a Newton step has.
+constexpr double least_curvature = 0.1;
+/// Steps of Newton's method, which stay within an interval.
+constexpr int line_steps = 8;
+
+}  // namespace
 
 template <class Scalar>
 double contact_energy(const std::vector<ContactPlane>& planes, double stiffness, const Scalar* places,
@@ -31,7 +40,49 @@ double contact_energy(const std::vector<ContactPlane>& planes, double stiffness,
   return energy;
 }
 
-#define ARAPFIELDS_CONTACT(Scalar) \
+template <class Scalar>
+double contact_step(const std::vector<ContactPlane>& planes, double stiffness, const Scalar* places,
+                    const Scalar* ways, double slope) {
+  struct Meeting {
+    double pressed;  // pressure − stiffness·gap
+    double rate;     // of its growth along the step
+    double share;
+  };
+  std::vector<Meeting> meetings;
+  for (const ContactPlane& plane : planes) {
+    if (plane.grip > 0.0) return 1.0;
+    const double pressed = plane.pressure - stiffness * plane.gap(places);
+    const double rate = -stiffness * (plane.gap(ways) + plane.offset);
+    if (pressed > 0.0 || pressed + rate > 0.0) meetings.push_back({pressed, rate, plane.share});
+  }
+  const auto at = [&](double t) {  // slope and curvature of the planes
+    double first = 0.0, second = 0.0;
+    for (const Meeting& m : meetings) {
+      const double pressed = m.pressed + t * m.rate;
+      if (pressed <= 0.0) continue;
+      first += m.share * pressed * m.rate / stiffness;
+      second += m.share * m.rate * m.rate / stiffness;
+    }
+    return std::pair(first, second);
+  };
+  const auto [contact_slope, contact_curvature] = at(0.0);
+  const double other_slope = slope - contact_slope;
+  const double other_curvature = std::max(-slope - contact_curvature, least_curvature * -slope);
+  double low = 0.0, high = 1.0, t = 1.0;
+  for (int step = 0; step < line_steps; ++step) {
+    const auto [first, second] = at(t);
+    const double along = other_slope + t * other_curvature + first;
+    if (t == 1.0 && along <= 0.0) return 1.0;
+    (along > 0.0 ? high : low) = t;
+    t -= along / (other_curvature + second);
+    if (!(t > low && t < high)) t = 0.5 * (low + high);
+  }
+  return t;
+}
+
+#define ARAPFIELDS_CONTACT(Scalar)                                                              \
+  template double contact_step<Scalar>(const std::vector<ContactPlane>&, double, const Scalar*, \
+                                       const Scalar*, double);                                  \
   template double contact_energy<Scalar>(const std::vector<ContactPlane>&, double, const Scalar*, Scalar*);
 ARAPFIELDS_CONTACT(float)
 ARAPFIELDS_CONTACT(double)

@@ -56,4 +56,11 @@ template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double contact_energy(const std::vector<ContactPlane>& planes, double stiffness,
                                                  const Scalar* places, Scalar* cotangents);
 
+/// How much of a step by `ways` (n,3), at most 1, to take from places (n,3): to the minimum along it of the
+/// planes' energy, which has a kink where a plane is met, and of a quadratic for all else. `slope` < 0 is
+/// that of both together, which a Newton step of 1 would end without kinks. 1 where friction acts.
+template <class Scalar>
+ARAPFIELDS_EXPORT_TO_TESTS double contact_step(const std::vector<ContactPlane>& planes, double stiffness,
+                                               const Scalar* places, const Scalar* ways, double slope);
+
 }  // namespace arapfields

@@ -55,7 +55,7 @@ Trial<Scalar> search_line(const MeasuredObjectiveOf<Scalar>& objective, const Tr
     return std::isfinite(trial.value) && std::isfinite(trial.slope) &&
            trial.value <= start.value + armijo * trial.t * start.slope;
   };
-  Trial<Scalar> low = start, next = at(1.0);
+  Trial<Scalar> low = start, next = at(objective.first_trial(start.u, du, start.slope));
   for (int tries = 0; tries < 12; ++tries) {
     if (!falls(next) || (next.value >= low.value && low.t > 0.0)) {  // the minimum lies between low and next
       const bool usable = std::isfinite(next.value) && std::isfinite(next.slope);

@@ -21,6 +21,12 @@ class MeasuredObjectiveOf {
   virtual RowMatrix<double> pull_back(const Eigen::VectorX<Scalar>& cotangents) const = 0;
   /// An approximation of the inverse Hessian, times a gradient.
   virtual RowMatrix<double> precondition(const RowMatrix<double>& gradient) const = 0;
+  /// The share of a step du from u that is tried first; `slope` is the function's along it.
+  virtual double first_trial(const Eigen::VectorX<Scalar>& u, const Eigen::VectorX<Scalar>& du,
+                             double slope) const {
+    static_cast<void>(u), static_cast<void>(du), static_cast<void>(slope);
+    return 1.0;
+  }
   /// After each accepted step: false ends the descent there.
   virtual bool accepted(const Eigen::VectorX<Scalar>& u) const {
     static_cast<void>(u);

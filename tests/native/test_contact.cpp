@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <array>
 #include <boost/test/unit_test.hpp>
+#include <cmath>
+#include <vector>
 
+#include "core/random.h"
 #include "energies/contact.h"
 #include "solve/radial/contact_rows.h"
 
@@ -29,6 +32,41 @@ BOOST_AUTO_TEST_CASE(cotangents_are_those_of_differences) {
     BOOST_TEST(std::abs((more - less) / (2.0 * step) - slopes[i]) < 1e-6);
   }
   BOOST_TEST(slopes[0] != 0.0);
+}
+
+BOOST_AUTO_TEST_CASE(a_step_ends_at_the_minimum_along_it) {
+  constexpr double stiffness = 50.0, near = 1e-3;
+  constexpr int shares = 10000;
+  Random random(3);
+  int shorter = 0;
+  for (int round = 0; round < 40; ++round) {
+    Vector places(9), ways(9);
+    for (Index i = 0; i < 9; ++i) places[i] = random.uniform() - 0.5, ways[i] = random.uniform() - 0.5;
+    std::vector<ContactPlane> planes;
+    for (Index k = 0; k < 6; ++k) {
+      const Vec3 normal = Vec3(random.uniform() - 0.5, random.uniform() - 0.5, 0.3).normalized();
+      planes.push_back(
+          {k % 3, k < 4 ? -1 : (k + 1) % 3, normal, random.uniform() - 0.7, random.uniform(), 0.2});
+    }
+    const auto energy = [&](double t) {
+      const Vector there = places + t * ways;
+      return contact_energy<double>(planes, stiffness, there.data(), nullptr);
+    };
+    constexpr double small = 1e-6;  // no plane is met so near
+    const double own = (energy(small) - energy(-small)) / (2.0 * small), slope = -10.0 - std::abs(own);
+    const double curved = std::max(
+        -slope - (energy(small) + energy(-small) - 2.0 * energy(0.0)) / (small * small), -0.1 * slope);
+    double least = 0.0, best = 0.0;
+    for (int k = 1; k <= shares; ++k) {
+      const double t = static_cast<double>(k) / shares;
+      const double value = (slope - own + 0.5 * curved * t) * t + energy(t) - energy(0.0);
+      if (value < least) least = value, best = t;
+    }
+    const double found = contact_step<double>(planes, stiffness, places.data(), ways.data(), slope);
+    BOOST_TEST(std::abs(found - best) < near);
+    shorter += found < 0.95;
+  }
+  BOOST_TEST(shorter > 5);
 }
 
 BOOST_AUTO_TEST_CASE(forces_are_complementary_to_gaps) {

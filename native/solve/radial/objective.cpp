@@ -51,6 +51,14 @@ void RadialObjective<Scalar>::set_contact(const ContactSet& contact) {
 }
 
 template <class Scalar>
+double RadialObjective<Scalar>::first_trial(const Measurements& u, const Measurements& du,
+                                            double slope) const {
+  if (contact_.size() == 0) return 1.0;
+  return contact_step<Scalar>(planes_->planes, planes_->stiffness, u.data() + contact_offset(),
+                              du.data() + contact_offset(), slope);
+}
+
+template <class Scalar>
 bool RadialObjective<Scalar>::accepted(const Measurements& u) const {
   if (!hooks_.observer) return true;
   const RadialTerms terms = evaluate(u, nullptr);

@@ -76,8 +76,7 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
     return {u.data() + contact_offset(), contact_.size(), 3};
   }
 
-  /// Twice the weights of the surrogate mean (‖J‖² + λ‖D‖²) + weight·handles, whose inverse precondition()
-  /// has, times measurements.
+  /// Twice the weights of mean (‖J‖² + λ‖D‖²) + weight·handles, which precondition() inverts, times u.
   Measurements weighted(const Measurements& u) const;
 
   void measure(const RowMatrix<double>& c, Measurements& u) const override;
@@ -85,6 +84,7 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   RowMatrix<double> pull_back(const Measurements& cotangents) const override;
   RowMatrix<double> pull_back_contact(const PointsOf<Scalar>& cotangents) const;  ///< from its places alone
   RowMatrix<double> precondition(const RowMatrix<double>& gradient) const override;
+  double first_trial(const Measurements& u, const Measurements& du, double slope) const override;
   bool accepted(const Measurements& u) const override;
 
  private:
