@@ -23,6 +23,9 @@ constexpr double settled = 1e-6;
 constexpr double under = 1.5, aside = 0.35;
 /// A handle that has moved less than that, in cube units, is as good as at rest.
 constexpr double unmoved = 1e-3;
+/// What the shape itself holds back is pulled by no more than from so far, in cube units: neighbours, held
+/// back in unlike ways, would squash what is between them.
+constexpr double longest_pull = 0.01;
 /// Searches for the thickest part of the shape beside a point handle, which may lie at an edge.
 constexpr int thicker = 3;
 
@@ -249,9 +252,24 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
   return by;
 }
 
-void set_reachable_targets(RadialState& s, std::vector<Mat4> motions) {
-  hold_back(s, motions);
-  s.fast.objective.latest()->set_targets(s.handles.targets_at(motions));
+void set_reachable_targets(RadialState& s, std::vector<Mat4> motions, bool gently) {
+  const std::vector<Index> by = hold_back(s, motions);
+  Points targets = s.handles.targets_at(motions);
+  RadialObjective<float>& objective = *s.fast.objective.latest();
+  const Index own = gently && s.contact.itself() && s.handles.any() ? s.handles.own_count() : 0;
+  const Index itself = s.contact.surface_count() - 1;
+  const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();
+  for (Index first = 0, last = 0; first < own; first = last) {
+    const Index handle = s.handles.handle_of(first);
+    while (last < own && s.handles.handle_of(last) == handle) ++last;
+    if (by[static_cast<std::size_t>(handle)] != itself) continue;
+    const Points left = (targets - values).middleRows(first, last - first);
+    const double length = std::sqrt(left.rowwise().squaredNorm().mean());
+    if (length > longest_pull)
+      targets.middleRows(first, last - first) =
+          values.middleRows(first, last - first) + longest_pull / length * left;
+  }
+  objective.set_targets(targets);
 }
 
 }  // namespace arapfields

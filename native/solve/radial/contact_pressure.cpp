@@ -10,8 +10,8 @@ namespace {
 
 /// Pressures grow by no deeper gaps, in cube units: a solve that has only begun says little of forces.
 constexpr double shallow = 0.01;
-/// Of stiffness, where depths do not fall.
-constexpr double harder = 4.0, hardest = 3e6;
+/// Of stiffness, where depths do not fall, and where they do.
+constexpr double harder = 4.0, hardest = 3e6, softer = 0.25;
 /// So far, in cube units, from a plane its mean pressure vanishes: a softer plane keeps what left it away.
 constexpr double hover = 2e-3;
 /// Forces farther than this from a handle, in cube units, count less.
@@ -103,7 +103,7 @@ void ContactSet::harden(bool more) {
     if (plane.pressure > 0.0) share += plane.share;
   }
   const double fitting = share > 0.0 ? sum / share / hover : 0.0;
-  const double wanted = std::max({stiffness, fitting, more ? harder * stiffness : 0.0});
+  const double wanted = std::max({softest, fitting, (more ? harder : softer) * stiffness});
   stiffness = std::min(wanted, hardest);
 }
 

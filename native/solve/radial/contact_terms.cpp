@@ -29,8 +29,6 @@ constexpr double kept_itself = 2.0 * ContactTerms::kept;
 /// What distances may be off by, in cube units: a straight way through a sheet is just as long as both
 /// together.
 constexpr double unsure = 1e-4;
-/// Stiffness of planes at first.
-constexpr double softest = 5e4;
 
 /// Places that came through a surface (rows of `now`) are beyond the side that they came from.
 void go_back(const BarrierSurface& surface, PointsIn now, const std::vector<Index>& moved_rows,
@@ -148,7 +146,7 @@ void ContactTerms::release() {
   found_.planes.clear();
   found_.places.resize(0, 3);
   found_.embedded.resize(0, 3);
-  found_.stiffness = softest;
+  found_.stiffness = ContactSet::softest;
   pressures_.setZero();
   deepest_ = deepest_outside_ = 0.0;
   touches_itself_ = false;

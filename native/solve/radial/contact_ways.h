@@ -17,14 +17,15 @@ struct ContactSet {
   Points places;            ///< (n,3) theirs at rest
   Points embedded;          ///< (n,3) these, in the basis' embedding; empty without one
   std::vector<ContactPlane> planes;
-  Revision revision = 0;   ///< 0: no planes
-  double stiffness = 0.0;  ///< of energy a unit of area for a unit of squared depth, halved
+  Revision revision = 0;                  ///< 0: no planes
+  double stiffness = 0.0;                 ///< of energy a unit of area for a unit of squared depth, halved
+  static constexpr double softest = 5e4;  ///< the stiffness at first
 
   /// The share of the area that presses.
   double touching() const;
   /// Forces of each surface, (surfaces, 3), on what is at a place: nearer ones count more.
   Points forces_at(const Vec3& place, const double* now, Index surfaces) const;
-  /// The planes become as stiff as their pressures ask for, or `more`: where depths do not fall.
+  /// The planes become as stiff as their pressures ask for, by steps, or `more`: where depths do not fall.
   void harden(bool more);
 };
 
