@@ -19,15 +19,19 @@ RigTwins::RigTwins(const RigShape& rig, PointsIn points) {
       (2.0 * rig.symmetry.offset - points.col(rig.symmetry.axis).array()).matrix();
   const Points none = Points::Zero(points.rows(), 3);
   twins = OrientedPoints(points, none).nearest(reflected, none, 0.0);
-  for (Index i = 0; i < points.rows(); ++i)
-    if ((points.row(twins[i]) - reflected.row(i)).norm() > symmetric_points * rig.extent) twins[i] = -1;
+  alike = twins;
+  for (Index i = 0; i < points.rows(); ++i) {
+    const double away = (points.row(twins[i]) - reflected.row(i)).norm();
+    if (away > symmetric_points * rig.extent) twins[i] = -1;
+    if (away > rig.spacing) alike[i] = -1;
+  }
 }
 
-void RigTwins::average(RowMatrix<float>& values) const {
+void RigTwins::average(RowMatrix<float>& values, const std::vector<Index>& others) const {
   if (bones.empty()) return;
   const RowMatrix<float> before = values;
   for (Index i = 0; i < values.rows(); ++i)
-    if (const Index other = twin(i); other >= 0)
+    if (const Index other = others[i]; other >= 0)
       for (Index b = 0; b < values.cols(); ++b)
         values(i, b) = 0.5f * (before(i, b) + before(other, bones[b]));
 }

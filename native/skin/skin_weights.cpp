@@ -39,6 +39,7 @@ Vector activity_of(const RigShape& rig, const Vector& errors) {
 /// Weights at a rig's nodes, and the poses that they were fitted to.
 struct Fitted {
   RowMatrix<float> nodes;
+  RowMatrix<float> support;
   std::vector<ExamplePose> poses;
 };
 
@@ -70,6 +71,7 @@ Fitted fitted_nodes(const RigShape& rig, PointsIn points, const std::vector<Inde
     activity = activity_of(rig, errors);
   }
   result.nodes = fit.weights();
+  result.support = fit.support(options.smoothness, options.influences);
   return result;
 }
 
@@ -82,14 +84,16 @@ RowMatrix<float> fitted_points(const RigShape& rig, const PiecePoints& given, co
   progress.report(0.9, "Weights");
   const VertexBlend blend(rig, given, near);
   const RigTwins mirror(rig, points);
-  RowMatrix<float> nearby = blend(fitted.nodes), distances = blend(rig.bone_distances);
-  mirror.average(nearby);
-  mirror.average(distances);
+  RowMatrix<float> nearby = blend(fitted.nodes), support = blend(fitted.support);
+  RowMatrix<float> distances = blend(rig.bone_distances);
+  mirror.average_alike(nearby);
+  mirror.average_alike(support);
+  mirror.average_alike(distances);
   const LimbSides limbs(rig, given, near, distances);
   progress.report(0.93, "Weights");
   RowMatrix<float> result =
-      point_weights(rig, points, fitted.poses, nearby, distances, near, limbs, mirror, options);
-  mirror.average(result);
+      point_weights(rig, points, fitted.poses, nearby, support, distances, near, limbs, mirror, options);
+  mirror.average_twins(result);
   return result;
 }
 

@@ -3,6 +3,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "core/parallel.h"
@@ -11,6 +13,34 @@ namespace arapfields {
 namespace {
 
 constexpr int sweeps = 20;
+/// How often the support is averaged over each node's neighbours.
+constexpr int support_sweeps = 6;
+/// A bone wanted as little as one that is left out costs infinitely much; others less, by this power of the
+/// ratio.
+constexpr double leaving_power = 4.0;
+
+/// A point's weights of the bones that are wanted most, at most so many. None comes or goes with a jump.
+FewBones among_wanted(const BonePairs& squares, double stiff, const FewBones& g, const FewBones& wanted,
+                      int influences) {
+  FewBones sorted = wanted;
+  std::ranges::sort(sorted, std::greater<>());
+  const double next = influences < sorted.size() ? std::max(sorted[influences], 0.0) : 0.0;
+  std::vector<Index> used;
+  for (Index j = 0; j < wanted.size(); ++j)
+    if (wanted[j] > next) used.push_back(j);
+  if (used.empty()) used.push_back(0);
+  BonePairs h = squares(used, used);
+  for (Index k = 0; k < h.rows(); ++k) {
+    const double ratio =
+        std::pow(next / std::max(wanted[used[static_cast<std::size_t>(k)]], 1e-12), leaving_power);
+    h(k, k) *= 1.0 + ratio / std::max(1.0 - ratio, 1e-6);
+  }
+  h.diagonal().array() += stiff;
+  const FewBones w = simplex_minimum(h, g(used), influences);
+  FewBones result = FewBones::Zero(wanted.size());
+  for (std::size_t k = 0; k < used.size(); ++k) result[used[k]] = w[static_cast<Index>(k)];
+  return result;
+}
 
 }  // namespace
 
@@ -35,7 +65,7 @@ void WeightFit::add(const ExamplePose& pose) {
   });
 }
 
-void WeightFit::update(Index node, double smoothness) {
+FewBones WeightFit::minimum(Index node, double smoothness, int influences) const {
   const BoneChoice& choice = choices_[node];
   const double stiff = smoothness * smoothness_weight;
   BonePairs h = choice.held_back(squares_[node]) * (rig_.trust[node] / static_cast<double>(poses_));
@@ -44,15 +74,35 @@ void WeightFit::update(Index node, double smoothness) {
   for (Index j = 0; j < choice.count(); ++j)
     for (const auto& [other, weight] : rig_.neighbours[node])
       g[j] += stiff * weight * static_cast<double>(weights_(other, choice.bones[j]));
-  const FewBones w = simplex_minimum(h, g, static_cast<int>(most_candidates));
-  for (Index j = 0; j < choice.count(); ++j) weights_(node, choice.bones[j]) = static_cast<float>(w[j]);
+  return simplex_minimum(h, g, influences);
 }
 
 void WeightFit::solve(double smoothness, const Progress& progress) {
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     progress.report(static_cast<double>(sweep) / sweeps);
-    for (Index i = 0; i < rig_.size(); ++i) update(i, smoothness);
+    for (Index i = 0; i < rig_.size(); ++i) {
+      const FewBones w = minimum(i, smoothness, static_cast<int>(most_candidates));
+      for (Index j = 0; j < w.size(); ++j) weights_(i, choices_[i].bones[j]) = static_cast<float>(w[j]);
+    }
   }
+}
+
+RowMatrix<float> WeightFit::support(double smoothness, int influences) const {
+  RowMatrix<float> result = RowMatrix<float>::Zero(weights_.rows(), weights_.cols());
+  parallel_for(0, rig_.size(), 64, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) {
+      const FewBones w = minimum(i, smoothness, influences);
+      for (Index j = 0; j < w.size(); ++j) result(i, choices_[i].bones[j]) = static_cast<float>(w[j]);
+    }
+  });
+  for (int sweep = 0; sweep < support_sweeps; ++sweep) {
+    const RowMatrix<float> before = result;
+    for (Index i = 0; i < rig_.size(); ++i)
+      for (const auto& [other, weight] : rig_.neighbours[i])
+        result.row(i) += static_cast<float>(weight) * before.row(other);
+    result *= 0.5f;
+  }
+  return result;
 }
 
 Vector WeightFit::squared_errors(const ExamplePose& pose) const {
@@ -68,15 +118,15 @@ Vector WeightFit::squared_errors(const ExamplePose& pose) const {
 }
 
 RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::vector<ExamplePose>& poses,
-                               const RowMatrix<float>& nearby, const RowMatrix<float>& distances,
-                               const std::vector<Index>& near, const LimbSides& limbs, const RigTwins& mirror,
-                               const SkinOptions& options) {
+                               const RowMatrix<float>& nearby, const RowMatrix<float>& support,
+                               const RowMatrix<float>& distances, const std::vector<Index>& near,
+                               const LimbSides& limbs, const RigTwins& mirror, const SkinOptions& options) {
   RowMatrix<float> result = RowMatrix<float>::Zero(points.rows(), rig.skeleton.count());
   const double stiff = options.smoothness * smoothness_weight;
   parallel_for(0, points.rows(), 16, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i) {
       const BoneChoice choice(rig, near[i], distances.row(i), limbs.sides[i], limbs.shares[i]);
-      const Index twin = mirror.twin(i), k = choice.count();
+      const Index twin = mirror.like(i), k = choice.count();
       BoneChoice other = choice;
       if (twin >= 0)
         for (Index& bone : other.bones) bone = mirror.bones[bone];
@@ -89,10 +139,12 @@ RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::
         h += twin < 0 ? square(choice, i) : BonePairs(0.5 * (square(choice, i) + square(other, twin)));
       }
       h = choice.held_back(h) * (rig.trust[near[i]] / static_cast<double>(poses.size()));
-      h.diagonal().array() += stiff;
-      FewBones g = -choice.penalties;
-      for (Index j = 0; j < k; ++j) g[j] += stiff * static_cast<double>(nearby(i, choice.bones[j]));
-      const FewBones w = simplex_minimum(h, g, options.influences);
+      FewBones g = -choice.penalties, wanted(k);
+      for (Index j = 0; j < k; ++j) {
+        g[j] += stiff * static_cast<double>(nearby(i, choice.bones[j]));
+        wanted[j] = static_cast<double>(support(i, choice.bones[j]));
+      }
+      const FewBones w = among_wanted(h, stiff, g, wanted, options.influences);
       for (Index j = 0; j < k; ++j) result(i, choice.bones[j]) = static_cast<float>(w[j]);
     }
   });

@@ -25,11 +25,14 @@ class WeightFit {
   void solve(double smoothness, const Progress& progress);
   /// (nodes, bones)
   const RowMatrix<float>& weights() const { return weights_; }
+  /// How much each bone is wanted (nodes, bones) where so few may move a node: the mean over the nodes about
+  /// it of the weights of the fit with so few, which alone would change from one node to the next.
+  RowMatrix<float> support(double smoothness, int influences) const;
   /// Squared distances (nodes) of the weights' shape from a pose's, in sizes of the shape.
   Vector squared_errors(const ExamplePose& pose) const;
 
  private:
-  void update(Index node, double smoothness);
+  FewBones minimum(Index node, double smoothness, int influences) const;
 
   const RigShape& rig_;
   std::vector<BoneChoice> choices_;
@@ -40,11 +43,11 @@ class WeightFit {
 
 /// Weights of other points of the shape, at most `influences` a point above 0, that reproduce the same poses,
 /// whose rows from `first` on are the points'. What the poses leave open is as in `nearby` (points, bones),
-/// the nodes' weights there; `distances` are to the bones through the inside, and `near` the nodes that the
-/// points are nearest to.
+/// the nodes' weights there, and which bones it may be says the nodes' `support` there; `distances` are to
+/// the bones through the inside, and `near` the nodes that the points are nearest to.
 RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::vector<ExamplePose>& poses,
-                               const RowMatrix<float>& nearby, const RowMatrix<float>& distances,
-                               const std::vector<Index>& near, const LimbSides& limbs, const RigTwins& mirror,
-                               const SkinOptions& options);
+                               const RowMatrix<float>& nearby, const RowMatrix<float>& support,
+                               const RowMatrix<float>& distances, const std::vector<Index>& near,
+                               const LimbSides& limbs, const RigTwins& mirror, const SkinOptions& options);
 
 }  // namespace arapfields
