@@ -20,7 +20,8 @@ using namespace wrap_parameters;
 using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 /// t: 0 in the first stage, 1 in the last.
-WrapStage stage_at(double t, const WrapOptions& options, const LandmarkPull& pull) {
+WrapStage stage_at(double t, const WrapOptions& options, const LandmarkPull& pull,
+                   const Schedule& tangential) {
   const auto most_centers = static_cast<double>(options.centers);
   const Schedule closeness{correspondence_weight.first, correspondence_weight.last * options.closeness},
       centers{std::min(first_centers, most_centers), most_centers};
@@ -28,7 +29,7 @@ WrapStage stage_at(double t, const WrapOptions& options, const LandmarkPull& pul
   stage.correspondences = {.weight = closeness.at(t),
                            .coverage = coverage * options.coverage,
                            .normals = options.normal_weight,
-                           .tangential = tangential_weight.at(t),
+                           .tangential = tangential.at(t),
                            .unoriented = unoriented_weight * t * t};
   stage.landmarks = pull.weight * std::pow(pull.growth, t);
   stage.rigidity = rigidity.at(t);
@@ -204,12 +205,13 @@ void WrapFlow::step(const WrapStage& stage, const Progress& progress) {
   progress.report(1.0);
 }
 
-void WrapFlow::run(const WrapOptions& options, const Progress& progress, const std::function<void()>& after) {
+void WrapFlow::run(const WrapOptions& options, const Progress& progress, const std::function<void()>& after,
+                   Schedule tangential) {
   const double all = options.stages * options.iterations;
   for (int done = 0; done < all; ++done) {
     const int stage = done / options.iterations;
     const double t = options.stages > 1 ? static_cast<double>(stage) / (options.stages - 1) : 1.0;
-    step(stage_at(t, options, pull_), progress.part(done / all, (done + 1) / all));
+    step(stage_at(t, options, pull_, tangential), progress.part(done / all, (done + 1) / all));
     if (after) after();
   }
 }

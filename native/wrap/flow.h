@@ -9,6 +9,7 @@
 #include "fields/composed_field.h"
 #include "mesh/surface_samples.h"
 #include "options/wrap.h"
+#include "wrap/parameters.h"
 #include "wrap/velocity.h"
 
 namespace arapfields {
@@ -41,8 +42,10 @@ class WrapFlow {
            PointsIn landmark_targets, LandmarkPull pull, std::uint64_t seed);
 
   void step(const WrapStage& stage, const Progress& progress);
-  /// All steps of all stages; `after` is called after each.
-  void run(const WrapOptions& options, const Progress& progress, const std::function<void()>& after = {});
+  /// All steps of all stages; `after` is called after each. `tangential`: the schedule's weight of tangential
+  /// distances, the less of which the more the surface slides along the target.
+  void run(const WrapOptions& options, const Progress& progress, const std::function<void()>& after = {},
+           wrap_parameters::Schedule tangential = wrap_parameters::tangential_weight);
   const std::vector<FieldStep>& steps() const { return steps_; }
   double matched_share() const { return matched_share_; }
   /// Current positions (k,3) of the landmarks.
