@@ -16,6 +16,12 @@ from ..core.settings.choices import SCOPES
 from .modal import ModalRun
 
 
+def named(label, error):
+    """The text of a UserError, with the item's name before it unless it says that itself."""
+    text = translated(error)
+    return text if error.values.get("name") == label else f"{label}: {text}"
+
+
 class JobOperator(ModalRun, Guided):
     """Mixin of operators whose work runs on the worker thread.
 
@@ -123,7 +129,7 @@ class JobOperator(ModalRun, Guided):
             if outcome.cancelled:
                 cancelled = True
             elif outcome.error:
-                self.failures.append(f"{outcome.item.label}: {translated(outcome.error)}")
+                self.failures.append(named(outcome.item.label, outcome.error))
             else:
                 cancelled |= yield from self.apply_one(outcome)
         if cancelled and not self.successes and not self.failures:

@@ -14,8 +14,9 @@ if IN_BLENDER:
     from support.blender.scenes import FIT
 
     import addon.deform.operators as deform
+    from addon.core.errors import UserError
     from addon.core.runtime import jobs
-    from addon.core.runtime.coroutines import Pause
+    from addon.core.runtime.coroutines import Pause, run_to_completion
     from addon.properties.choices import RESULT_ITEMS
     from addon.results.placement import placement_refusal
 
@@ -150,3 +151,19 @@ def test_without_a_window_the_course_gives_what_blocking_gives():
     jobs.stop()
     assert np.array_equal(scenes.world_points(bpy.data.objects["Bar_deformed"]), blocking)
     assert fraction > 0.9  # the share done and "iteration 40 of 40" say the same
+
+
+def test_what_a_worker_refuses_names_its_object_once():
+    scenes.activate(scenes.bar())
+
+    def refusing(error):
+        def work(tracker):
+            raise error
+
+        operator = stages.Operator(deform.ARAPFIELDS_OT_deform, plan=lambda *_: jobs.Item("Bar", work))
+        run_to_completion(operator.coroutine(bpy.context), wait=lambda: jobs.running().join(0.05))
+        jobs.stop()
+        return operator.said
+
+    assert refusing(UserError("{name}: the mesh is empty", name="Bar")) == ["Bar: the mesh is empty"]
+    assert refusing(ValueError("handles: none")) == ["Bar: handles: none"]
