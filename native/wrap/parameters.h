@@ -28,7 +28,7 @@ constexpr Schedule rigidity{1.0, 0.1};  // tuned
 constexpr double viscosity = 1.5;  // tuned
 /// Weight of tangential beside normal distances: between point-to-point (Besl, McKay 1992) and point-to-plane
 /// (Chen, Medioni 1992, "Object Modelling by Registration of Multiple Range Images").
-constexpr Schedule tangential_weight{0.3, 0.02};  // tuned
+constexpr Schedule tangential_weight{0.3, 0.05};  // tuned
 /// The same of coarse wraps that choose landmarks: one that slides less shows what contradicts it.
 constexpr Schedule coarse_tangential_weight{0.3, 0.1};  // tuned
 /// Weight of the distances from the target to the surface beside those from the surface, times the option
