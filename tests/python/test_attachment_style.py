@@ -15,7 +15,7 @@ MOST = 2.0  # times as long: what an edge becomes, where the surface below takes
 
 @pytest.fixture(scope="module")
 def styled():
-    body = af.sample_surface(trousers(), 10000, seed=0)
+    body = af.sample_surface(trousers(), 5000, seed=0)
     return body, af.stylize(body, "cube", up=[0, 0, 1])
 
 

@@ -76,7 +76,7 @@ def test_our_own_stretch_in_python_is_a_second_share_of_it(kind):
     samples = af.sample_mesh(vertices + np.array([3, 0, -2]), triangles, 600)
     calls = {"own": [], "ours": []}
     styled = dict(field=kind, strength=1.0, barrier=0.0, bending=0.0, **{k: v for k, v in settings().items()})
-    styled["iterations"] = 15 if kind == "neural" else 200
+    styled["iterations"] = 15 if kind == "neural" else 100
     for key, rigidity, energies in [("own", 1.0, [Stretch(1.0)]), ("ours", 2.0, [])]:
         options = af.StylizeOptions(rigidity=rigidity, **styled)
         af.stylize(samples, "cube", options, energies=energies, callback=calls[key].append)

@@ -133,7 +133,7 @@ def test_loose_parts_take_what_lies_below_and_small_closed_ones_one_motion(legs,
 
 def test_correctives_take_the_skin_closer(legs, weights):
     bones, (V, F) = rig(), legs
-    keys = af.skin_correctives(V, F, bones, weights, af.SkinOptions(correctives=16, samples=2000))
+    keys = af.skin_correctives(V, F, bones, weights, af.SkinOptions(correctives=16, samples=1000))
     assert len(keys) == 16 and all(bones[key.bone].parent is not None for key in keys)
     assert all(abs(key.value(np.eye(3))) < 1e-12 and key.offsets.shape == V.shape for key in keys)
     assert max(abs(key.value(rotation(np.array([2.0, 1, 0])))) for key in keys) == 1  # no farther than seen

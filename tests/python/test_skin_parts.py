@@ -56,7 +56,7 @@ def skinned():
 def test_correctives_open_no_cracks_between_triangles_that_only_touch():
     vertices, triangles, _ = dressed(count=10)
     loose, alone = vertices[triangles].reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3)
-    options = af.SkinOptions(poses=8, samples=2000, correctives=6)
+    options = af.SkinOptions(poses=6, samples=1000, correctives=4)
     weights = af.skin_weights((loose, alone), BONES_OF_FIGURE, options)
     keys = af.skin_correctives(loose, alone, BONES_OF_FIGURE, weights, options)
     _, place = np.unique(loose, axis=0, return_inverse=True)
