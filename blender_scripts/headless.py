@@ -4,7 +4,9 @@
 The add-on is the installed extension where that is enabled, else the one of this repository.
 """
 
+import contextlib
 import importlib
+import os
 import re
 import sys
 from pathlib import Path
@@ -38,4 +40,10 @@ def main(verb, script):
     run = importlib.import_module(f"{addon().__name__}.commands.main").run
     code = run([verb, *arguments], script)
     sys.stdout.flush()
-    sys.exit(code)
+    if bpy.app.binary_path:
+        sys.exit(code)
+    # As Python ends, its module of Blender may wait for ever for a thread of its own.
+    sys.stderr.flush()
+    with contextlib.suppress(OSError):
+        os.rmdir(bpy.app.tempdir)  # which is left empty
+    os._exit(code or 0)

@@ -2,6 +2,7 @@
 """deform, stylize and batch as scripts of Python's bpy: real files in, real files out."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -116,6 +117,17 @@ def blenders_at_work(process):
             return children
         assert process.poll() is None
         time.sleep(0.05)
+
+
+def test_a_script_ends_whatever_python_waits_for_as_it_ends(user_folder, tmp_path):
+    """As its module of Blender does for ever, once in some hundred interruptions."""
+    (tmp_path / "sitecustomize.py").write_text("import atexit, time\natexit.register(time.sleep, 600)\n")
+    paths = os.pathsep.join([str(tmp_path), user_folder["PYTHONPATH"]])
+    call = [sys.executable, str(ROOT / "blender_scripts/stylize.py"), "-i", "absent.ply", "-o", "out.ply"]
+    environment = user_folder | {"PYTHONPATH": paths, "TMPDIR": str(tmp_path)}
+    done = subprocess.run(call, env=environment, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2 and "absent.ply" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["sitecustomize.py"]
 
 
 def test_a_batch_that_is_killed_takes_its_blenders_along(user_folder, tmp_path):
