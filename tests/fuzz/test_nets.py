@@ -13,9 +13,9 @@ from .splats import splat_calls
 COUNTS = {
     "fields": 1400,
     "sdfs": 500,
-    "meshes": 200,
-    "handles": 250,
-    "normals": 200,
+    "meshes": 300,
+    "handles": 400,
+    "normals": 300,
     "records": 300,
     "api": 350,
 }
