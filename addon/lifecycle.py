@@ -78,9 +78,10 @@ def after_update(scene, depsgraph):
             row_selection.follow(bpy.context)
             left_behind.follow(bpy.context)
             active = getattr(bpy.context, "active_object", None)
-            if active is not None and active.library is None:
-                copies.switch_off(active)
-                recovery.forget_copy(active)
+            if active is not None:
+                recovery.disown(active)
+                if active.library is None:
+                    copies.switch_off(active)
 
 
 @persistent

@@ -65,10 +65,14 @@ class LiveObject:
 
 def forget(source):
     """The source is no longer live: it is seen as before, and lists no live result; returns that, if any."""
-    settings = settings_of(source)
-    settings.live_kind = ""
+    settings_of(source).live_kind = ""
     visibility.give_back(source)
-    item = None
+    return forget_result(source)
+
+
+def forget_result(source):
+    """Takes the live result off the source's list; returns it, if any."""
+    settings, item = settings_of(source), None
     for index in reversed(range(len(settings.results))):
         if settings.results[index].kind == LIVE:
             item = settings.results[index].item

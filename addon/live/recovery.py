@@ -63,19 +63,20 @@ def bring_back(source):
     return True
 
 
-def forget_copy(item):
-    """A copy of a live object is not live itself; what it shows is its own."""
+def disown(item):
+    """An object that says it is live without a session of its own: a copy of one that is, whose shape is the
+    copy's own, or one from another file."""
     settings = settings_of(item)
-    others = (session.number for uid, session in live.items() if uid != item.session_uid)
-    if not settings.live_kind or is_live(item) or settings.live_number not in others:
+    if not settings.live_kind or is_live(item) or item.session_uid in (live.begun, *live.returning):
         return
+    if any(session.number == settings.live_number for session in live.values()):
+        visibility.forget(item)
+        if item.data.users == 1:
+            stored.put_mark(item, "")
+        live_object.forget_result(item)
+    else:
+        adopt(item)
     settings.live_kind = ""
-    visibility.forget(item)
-    if item.data.users == 1:
-        stored.put_mark(item, "")
-    for index in reversed(range(len(settings.results))):
-        if settings.results[index].kind == live_object.LIVE:
-            settings.results.remove(index)
 
 
 def discard_live_object(source):

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live mode: while handles move or a style's sliders change, shapes follow; off, all is as it was.
 
-A tool or script makes an object live with begin(context, source), has it look and show the newest shape with
-update(context) (in a window a timer does; `wait` seconds for the shape to follow), and ends it with
-end(context, source), or end(context, source, keep=True) where the shape is to stay.
+A tool or script makes an object live with begin(context, source), has it show the newest shape with
+update(context) (in a window a timer does), and ends it with end(context, source, keep).
 """
 
 import contextlib
@@ -31,6 +30,7 @@ class Sessions(dict):
     """{session_uid of the source: Session} of all that is live."""
 
     is_rendering = False  # then frames are followed one by one, and nothing else
+    begun = None  # session_uid of a source whose session is being made
 
     def __init__(self):
         # {number of a session that has ended: Former}; Blender undoes up to 256 steps.
@@ -70,6 +70,7 @@ def begin(context, source, kind="DEFORM", keeps_shape=False):
     `keeps_shape`: what is shown stays when live mode ends.
     """
     end_for_kind(context, source, kind)
+    live.begun = source.session_uid
     earlier, session = live.part_with(source.session_uid), None
     former = live.returning.pop(source.session_uid, None) if earlier is None else earlier.former
     if former is None or settings_of(source).live_kind != kind:
@@ -85,6 +86,8 @@ def begin(context, source, kind="DEFORM", keeps_shape=False):
         else:
             layers.put_back(context, source, gone)
         raise
+    finally:
+        live.begun = None
     if session.display.in_place:
         layers.note(source, kind)
     live[source.session_uid] = session
@@ -133,8 +136,7 @@ def end(context, source, keep=False):
 
 
 def end_for_job(context, source, output, result):
-    """Ends live mode before a solve that goes on from the same handles, and whose result goes there; whether
-    there was any.
+    """Ends live mode before a solve whose result goes there; whether there was any.
 
     Where the result moves the same modifier, the live shape is seen until it comes, and stays if it never
     does; otherwise the source is what it was before live mode.

@@ -140,3 +140,30 @@ def test_a_copy_of_a_live_object_is_not_live(linked):
     assert bpy.ops.arapfields.remove_field() == {"FINISHED"} and not copied.modifiers
     step(refined=True)
     assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
+
+
+@pytest.mark.parametrize("result", ["MODIFIER", "NEW"])
+@pytest.mark.parametrize("linked", [False, True])
+def test_what_was_live_in_another_file_is_not_live_where_it_is_appended(tmp_path, result, linked):
+    bar, _, moving = scenes.bar_with_handles()
+    bar.arapfields.result = result
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.4
+    step(refined=True)
+    shown = scenes.world_points(bar)
+    bpy.data.libraries.write(str(tmp_path / "live.blend"), {bar})
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    append = bpy.ops.wm.link if linked else bpy.ops.wm.append
+    append(directory=str(tmp_path / "live.blend/Object"), filename="Bar")
+    bar = bpy.data.objects["Bar"]
+    bpy.context.view_layer.objects.active = bar
+    bpy.context.view_layer.update()
+    assert not bar.arapfields.live_kind and not sessions.is_live(bar)
+    kept = [entry.item.name for entry in bar.arapfields.results]
+    assert kept == (["Bar_deformed"] if result == "NEW" and not linked else [])
+    assert bar.hide_render == bool(kept) and all(name in bpy.context.scene.objects for name in kept)
+    assert np.array_equal(scenes.world_points(bar), shown)
+    if not linked and not kept:
+        assert bpy.ops.arapfields.live() == bpy.ops.arapfields.live() == {"FINISHED"}
+        step(refined=True)
+        assert np.array_equal(scenes.world_points(bar), shown)
