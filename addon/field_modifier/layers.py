@@ -43,6 +43,12 @@ def stays_below(source, kind):
     return can_stay(source) and ORDER[settings_of(source).moved_by] < ORDER[kind]
 
 
+def below_pose(source, in_place):
+    """The modifiers that make the shape on which a deformation acts."""
+    field = [modifier_stack.find(source)] if in_place and stays_below(source, "DEFORM") else []
+    return [*modifier_stack.before(source, in_place), *field]
+
+
 def replaced(source, kind):
     """The UserError that says which result a run of that kind replaces; None where it is one of its own kind,
     or stays."""

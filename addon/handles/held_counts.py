@@ -6,7 +6,7 @@ Counted at once; for large meshes in a window by a worker, while the window goes
 
 import bpy
 
-from ..blender import mesh_arrays, timers, vertex_groups
+from ..blender import mesh_arrays, modifier_stack, timers, vertex_groups
 from ..blender.host import has_window
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.point_data import points_of
@@ -16,6 +16,7 @@ from ..core.geometry.handles import Handle
 from ..core.runtime import native
 from ..core.runtime.coroutines import Pause, run_to_completion, step_for
 from ..core.runtime.threads import start_thread
+from ..field_modifier import layers
 from . import empties, movers, subdivided
 from .native_handles import Holding
 
@@ -40,8 +41,10 @@ def count_inside(context, source, at_once=False):
 def counting(context, source):
     """Coroutine that counts for all handles of a source."""
     in_place = settings_of(source).in_place
-    reference, mesh = ObjectReference(source), mesh_arrays.read(context, source, in_place)
-    shown = subdivided.read(context, source, in_place)
+    reference, below = ObjectReference(source), layers.below_pose(source, in_place)
+    with modifier_stack.mesh_of(context, source, below) as shape:
+        mesh = mesh_arrays.arrays_of(source, shape)
+    shown = subdivided.read(context, source, in_place, below)
     weights = yield from vertex_groups.read_weights(context, source, empties.group_names(source), in_place)
     source = reference.get()
     regions = {movers.key_of(entry): region_of(entry, weights) for entry in empties.used(source)}

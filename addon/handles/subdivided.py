@@ -13,9 +13,9 @@ from ..blender.vertex_groups import NearestVertices
 MOST = 20000  # vertices from which the surface is subdivided no further
 
 
-def read(context, source, in_place, into=np.asarray):
+def read(context, source, in_place, below, into=np.asarray):
     """((m, 3) places on the surface at the field's place, (m, 3) where they are seen), in local coordinates
-    or `into` others; None where no box could need them."""
+    or `into` others; None where no box could need them. `below` are the modifiers that make that surface."""
     own = modifier_stack.find(source) or modifier_stack.find_cache(source)
     behind = list(source.modifiers)[modifier_stack.place(source) :] if in_place else []
     shown = [m for m in behind if m != own and m.type == "SUBSURF" and m.show_viewport and m.levels]
@@ -23,7 +23,7 @@ def read(context, source, in_place, into=np.asarray):
     boxes = any(entry.kind == "CUBE" for entry in settings_of(source).handles)
     if not shown or not boxes:
         return None
-    kept = [*modifier_stack.before(source, in_place), shown[0]]
+    kept = [*below, shown[0]]
     with modifier_stack.staged(context, source, kept) as (copied, layer):
         fine, both = copied.modifiers[shown[0].name], []
         room = math.log(MOST / max(1, len(source.data.loops)), 4)  # the first level makes a quad of a corner

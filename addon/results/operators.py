@@ -12,6 +12,7 @@ from ..core.runtime.jobs import Item
 from ..core.settings.parameters import EXTRACTION
 from ..field_modifier import layers, motion
 from ..field_nodes import helper
+from ..handles.following import Followers
 from ..jobs.job_operator import JobOperator
 from ..properties.choices import extraction, surface
 from ..surface.source_surface import read_surface
@@ -63,6 +64,7 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
 
     def change(self, context, source):
         layers.uncover(source)
+        followers = Followers(context, source) if settings_of(source).moved_by == "WRAP" else None
         try:
             if not modifier_stack.layers(source):
                 rest_bones.reset(context, source)
@@ -72,6 +74,8 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
         layers.uncover(source)
         carried_objects.give_back_all(source)
         helper.clear(source)
+        if followers is not None:
+            followers.follow(context, source)
 
 
 class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):

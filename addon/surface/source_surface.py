@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..blender import mesh_arrays
+from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.splat_layouts import Splats
 from ..blender.vertex_groups import NearestVertices
@@ -146,7 +146,7 @@ def read_surface(context, source, in_place=False, *, exact=None, fit_operator=No
     context.view_layer.update()
     mesh, settings = mesh_arrays.read(context, source, in_place), settings_of(source)
     space = space_of(source.matrix_world, source.name)
-    vertices = space.to_solve(mesh.vertices)
+    vertices, below = space.to_solve(mesh.vertices), modifier_stack.before(source, in_place)
     return SourceSurface(
         reference=ObjectReference(source),
         space=space,
@@ -160,5 +160,5 @@ def read_surface(context, source, in_place=False, *, exact=None, fit_operator=No
         stiffness=(None, None) if carrying is None else painted.read(context, source, in_place),
         solids=[] if carrying is None else carrying.solids(context, space),
         splats=in_world_shape(mesh.splats, space, source),
-        shown=None if carrying is None else subdivided.read(context, source, in_place, space.to_solve),
+        shown=None if carrying is None else subdivided.read(context, source, in_place, below, space.to_solve),
     )

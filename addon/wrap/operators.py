@@ -13,11 +13,14 @@ from ..blender.property_definitions import annotations, effective_value, effecti
 from ..blender.source_operator import SourceOperator
 from ..carried import hanging, rest_bones
 from ..core.errors import UserError
+from ..core.geometry.handles import nothing_held
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.parameters import WRAP
 from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..field_modifier import layers
+from ..handles import empties
+from ..handles.following import Followers
 from ..properties.choices import result_properties
 from ..results.placement import holds_place
 from . import landmarks, transfer
@@ -95,23 +98,24 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
 
         places = effective_value("move_object", settings.wrap, self) and not holds_place(source)
         item = plan_solve_job(context, self, source, "WRAP", values["samples"], values["seed"], solve, places)
-        return with_rest(item, marks, fitting, below)
+        return self.with_rest(item, marks, fitting, below, Followers(context, source))
 
+    def with_rest(self, item, marks, fitting, below, followers):
+        """The same item, which marks landmarks and moves bones and handles as well."""
 
-def with_rest(item, marks, fitting, below):
-    """The same item, which marks landmarks and moves the bones as well."""
+        def apply(solved):
+            said, context, source = item.apply(solved), bpy.context, marks.source.get()
+            marks.put()
+            for one in below:
+                one.kept = True
+            if fitting is not None:
+                hanging.follow(context, source, solved[0].carried, lambda: fitting.put(context))
+            followers.follow(context, source)
+            empty = empties.holding_nothing(source)
+            self.warnings += [f"{source.name}: {translated(nothing_held(empty))}"] if empty else []
+            return said
 
-    def apply(solved):
-        said = item.apply(solved)
-        marks.put()
-        for one in below:
-            one.kept = True
-        if fitting is not None:
-            context, (result, _) = bpy.context, solved
-            hanging.follow(context, marks.source.get(), result.carried, lambda: fitting.put(context))
-        return said
-
-    return replace(item, apply=apply)
+        return replace(item, apply=apply)
 
 
 class ARAPFIELDS_OT_add_landmark(SourceOperator, bpy.types.Operator):

@@ -84,7 +84,7 @@ def test_a_box_beside_what_is_seen_still_holds_nothing():
 
 def test_large_cages_are_subdivided_less():
     cube, *_ = subdivided_cube(levels=6)
-    places, seen = subdivided.read(bpy.context, cube, True)
+    places, seen = subdivided.read(bpy.context, cube, True, [])
     assert len(places) == len(seen) < subdivided.MOST
     assert np.abs(np.abs(places).max(axis=1) - 1.0).max() < 1e-6  # on the cage
     assert np.abs(seen - places).max() > 0.1 and len(bpy.data.scenes) == 1

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Empties of handles go with the surface that they hold where a wrap moves it, or is taken off.
+
+Where a deformation would not act on what the wrap has made (layers.py), they stay.
+"""
+
+import numpy as np
+from mathutils import Matrix
+
+from ..blender import mesh_arrays, modifier_stack
+from ..core.geometry.box_fit import followed_box
+from ..core.geometry.spaces import inverse, transform
+from ..field_modifier import layers
+from . import empties, held_counts
+from .movers import box_now, matrix_of, rest_of
+
+
+class Followers:
+    """The handles of a source, before its surface goes elsewhere."""
+
+    def __init__(self, context, source):
+        entries = [entry for entry in empties.used(source) if entry.kind != "BONE"]
+        self.before = seen(context, source) if entries else None
+
+    def follow(self, context, source):
+        """Moves handles at rest, and their Empties as far, to where the surface is now."""
+        after = None if self.before is None else seen(context, source)
+        if after is None or len(after) != len(self.before) or np.array_equal(after, self.before):
+            return
+        world, moved = matrix_of(source), []
+        for entry in empties.used(source):
+            if entry.kind == "BONE" or not is_free(entry.empty):
+                continue
+            rest, now = world @ rest_of(entry), box_now(entry)
+            box = followed_box(rest, self.before, after, is_box=entry.kind == "CUBE")
+            moved.append((entry, box, np.allclose(rest, now, rtol=0, atol=1e-5 * np.abs(rest[:3, :3]).max())))
+            motion = box @ inverse(rest) @ np.array(entry.empty.matrix_world, dtype=np.float64)
+            entry.empty.matrix_world = Matrix(motion.tolist())
+        context.view_layer.update()
+        for entry, box, is_at_rest in moved:
+            if is_at_rest:
+                empties.store_rest(source, entry)
+            else:
+                entry.rest = (inverse(world) @ box).ravel()
+        held_counts.count_inside(context, source, at_once=True)
+
+
+def seen(context, source):
+    """(n, 3) vertices in the world of the shape on which a deformation acts."""
+    with modifier_stack.mesh_of(context, source, layers.below_pose(source, in_place=True)) as mesh:
+        return transform(matrix_of(source), mesh_arrays.positions(mesh))
+
+
+def is_free(empty):
+    """Whether an Empty's place is its own."""
+    data = empty.animation_data
+    driven = data is not None and (data.action or data.drivers or data.nla_tracks)
+    return empty.library is None and empty.override_library is None and not driven and not empty.constraints
