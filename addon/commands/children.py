@@ -20,17 +20,18 @@ class Children:
 
     def __init__(self, environment, limit):
         self.limit, self.running, self.stopped = limit, set(), False
-        self.pipe, self.alive = os.pipe()  # nothing is ever written; the system closes it with this process
-        # Windows gives a child no descriptors but the three of every program.
-        self.environment = {**environment, PARENT: "0" if WINDOWS else str(self.pipe)}
+        # Nothing is ever written to the pipe; the system closes it with this process. Windows gives a child
+        # the three streams of every program alone, and none starts while another one reads its input.
+        self.pipe = () if WINDOWS else os.pipe()
+        self.environment = {**environment, PARENT: str(os.getpid() if WINDOWS else self.pipe[0])}
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
         self.stop()
-        os.close(self.pipe)
-        os.close(self.alive)
+        for descriptor in self.pipe:
+            os.close(descriptor)
 
     def stop(self):
         self.stopped = True
@@ -52,8 +53,8 @@ class Children:
     def ties(self):
         """A Ctrl-C reaches the batch alone, which ends its children; its pipe reaches them."""
         if WINDOWS:
-            return {"stdin": self.pipe, "creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
-        return {"stdin": subprocess.DEVNULL, "pass_fds": (self.pipe,), "start_new_session": True}
+            return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+        return {"pass_fds": self.pipe[:1], "start_new_session": True}
 
     def wait(self, command, stream):
         """The child's exit code; None when it took too long."""
@@ -61,6 +62,7 @@ class Children:
             return 130
         process = subprocess.Popen(
             command,
+            stdin=subprocess.DEVNULL,
             stdout=stream,
             stderr=subprocess.STDOUT,
             env=self.environment,

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How to start another Blender like this one: a batch gives each file a process of its own."""
 
+import ctypes
 import os
 import signal
 import sys
@@ -9,23 +10,26 @@ from pathlib import Path
 
 from ..core.runtime.threads import start_thread
 
-PARENT = "ARAPFIELDS_PARENT"  # the descriptor of a pipe that closes when the batch ends, however it does
+# The descriptor of a pipe that closes when the batch ends, however it does; on Windows the batch's process.
+PARENT = "ARAPFIELDS_PARENT"
 PATIENCE = 5.0  # seconds in which a Blender that was asked to end may do so
 
 
 def end_with_parent():
     """In a batch's child: ends this process when the batch is no more, even killed."""
     try:
-        pipe = int(os.environ.pop(PARENT, ""))
+        parent = int(os.environ.pop(PARENT, ""))
     except ValueError:
         return
 
     def watch():
-        try:
-            while os.read(pipe, 1):
-                pass
-        except OSError:
-            return  # not a batch's child after all
+        if os.name == "nt":
+            wait_for_process(parent)
+        else:
+            try:
+                os.read(parent, 1)
+            except OSError:
+                return  # not a batch's child after all
         # An interruption, which leaves no partial file; os.kill would end the process at once on Windows.
         if os.name == "nt":
             signal.raise_signal(signal.SIGTERM)
@@ -35,6 +39,14 @@ def end_with_parent():
         os._exit(130)
 
     start_thread("parent", watch)
+
+
+def wait_for_process(number):
+    """Returns once that process of Windows has ended."""
+    kernel, synchronize, ever = ctypes.WinDLL("kernel32"), 0x100000, 0xFFFFFFFF
+    kernel.OpenProcess.restype = ctypes.c_void_p
+    process = kernel.OpenProcess(synchronize, False, number)  # none of one that is no more
+    kernel.WaitForSingleObject(ctypes.c_void_p(process), ever)
 
 
 class Launch:

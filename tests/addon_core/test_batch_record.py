@@ -61,23 +61,38 @@ def test_differences_are_named():
 
 
 def test_children_end_with_a_parent_that_is_killed(tmp_path):
+    """Two at once: each holds a lock for as long as it lives."""
     child = (
-        f"import os, sys, time; sys.path.insert(0, {str(ROOT)!r})\n"
+        f"import sys, time; sys.path.insert(0, {str(ROOT)!r})\n"
         "from addon.commands.launch import end_with_parent\n"
-        "end_with_parent(); open(sys.argv[1], 'w').write(str(os.getpid())); time.sleep(60)\n"
+        "from addon.commands.record import Record\n"
+        "end_with_parent(); record = Record(sys.argv[1])\n"
+        "while not record.claim(sys.argv[2]): time.sleep(0.01)\n"
+        "time.sleep(600)\n"
     )
     parent = (
-        f"import os, sys; sys.path.insert(0, {str(ROOT)!r})\n"
+        f"import os, sys, threading; sys.path.insert(0, {str(ROOT)!r})\n"
         "from addon.commands.children import Children\n"
         "with Children(dict(os.environ), None) as children:\n"
-        f"    children.run([sys.executable, '-c', {child!r}, sys.argv[1]])\n"
+        f"    command = [sys.executable, '-c', {child!r}, sys.argv[1]]\n"
+        "    for name in ('a', 'b'):\n"
+        "        threading.Thread(target=children.run, args=([*command, name],)).start()\n"
+        "    sys.stdin.read()\n"
     )
-    note = tmp_path / "pid"
-    process = subprocess.Popen([sys.executable, "-c", parent, str(note)])
-    wait_for(lambda: note.exists() and note.read_text())
+    command = [sys.executable, "-c", parent, str(tmp_path)]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE)
+    record = Record(tmp_path)
+
+    def held():
+        free = [name for name in ("a", "b") if record.claim(name)]
+        for name in free:
+            record.release(name)
+        return 2 - len(free)
+
+    wait_for(lambda: held() == 2)
     process.kill()
-    process.wait()
-    wait_for(lambda: not Path(f"/proc/{note.read_text()}").exists())
+    process.communicate()
+    wait_for(lambda: held() == 0)
 
 
 def wait_for(condition, seconds=30.0):

@@ -5,6 +5,7 @@ import contextlib
 import errno
 import os
 import sys
+import threading
 import time
 
 if sys.platform == "win32":
@@ -14,6 +15,7 @@ else:
 
 PAUSE = 0.05  # seconds between tries, where the system does not wait itself
 LARGEST = 2**31 - 1  # Windows takes positions of 32 bits; the byte need not exist
+POSITION = threading.Lock()  # Windows locks at the file's position, which threads share
 
 
 def lock(file, byte=0, wait=True):
@@ -23,9 +25,8 @@ def lock(file, byte=0, wait=True):
         fcntl.lockf(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB), 1, byte)
         return
     while True:
-        os.lseek(file.fileno(), byte & LARGEST, os.SEEK_SET)
         try:
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+            set_lock(file, byte, msvcrt.LK_NBLCK)
             return
         except OSError as error:
             if error.errno not in (0, errno.EACCES):  # 0: Wine gives no reason
@@ -41,5 +42,11 @@ def unlock(file, byte=0):
         if sys.platform != "win32":
             fcntl.lockf(file, fcntl.LOCK_UN, 1, byte)
         else:
-            os.lseek(file.fileno(), byte & LARGEST, os.SEEK_SET)
-            msvcrt.locking(file.fileno(), msvcrt.LK_UNLCK, 1)
+            set_lock(file, byte, msvcrt.LK_UNLCK)
+
+
+def set_lock(file, byte, mode):
+    """Windows' own, without waiting."""
+    with POSITION:
+        os.lseek(file.fileno(), byte & LARGEST, os.SEEK_SET)
+        msvcrt.locking(file.fileno(), mode, 1)

@@ -174,7 +174,7 @@ void ContactPoints::coarsen() {
   is_fine_.assign(samples_.size(), false);
   rest_.conservativeResize(coarse_, Eigen::NoChange);
   if (embedded_.rows() > 0) embedded_.conservativeResize(coarse_, Eigen::NoChange);
-  places_.conservativeResize(std::min(places_.rows(), coarse_), Eigen::NoChange);
+  places_.conservativeResize(std::min<Index>(places_.rows(), coarse_), Eigen::NoChange);
 }
 
 const Points& ContactPoints::at(const RowMatrix<double>& coefficients) {
@@ -213,7 +213,7 @@ Points ContactPoints::normals_at(const RowMatrix<double>& coefficients, const st
   for (Index k = 0; k < count; ++k) {
     const Index block = blocks != nullptr ? (*blocks)[static_cast<std::size_t>(k)] : k;
     const Index first = evaluator.block_size * block;
-    for (Index i = first; i < std::min(first + evaluator.block_size, normals.rows()); ++i) turn(i);
+    for (Index i = first; i < std::min<Index>(first + evaluator.block_size, normals.rows()); ++i) turn(i);
   }
   return normals;
 }
