@@ -104,9 +104,10 @@ def take_group(modifier, group):
 
 def take_helper(source, modifier, mesh):
     """Has the modifier read its offsets from this mesh."""
-    for attribute in list(mesh.attributes):
-        if not attribute.is_required and not attribute.is_internal and attribute.name not in (OFFSETS, TURNS):
-            mesh.attributes.remove(attribute)
+    own = [one.name for one in mesh.attributes if not (one.is_required or one.is_internal)]
+    for name in own:  # not the attributes themselves: Blender moves those left when one is removed
+        if name not in (OFFSETS, TURNS):
+            mesh.attributes.remove(mesh.attributes[name])
     mesh.materials.clear()
     helper = inputs.get(modifier, "Offsets")
     mesh.name = f"{source.name}{HELPER_SUFFIX}"

@@ -47,6 +47,23 @@ def test_objects_that_share_a_mesh_move_alone():
     assert len([o for o in bpy.data.objects if "offsets" in o.name]) == 1
 
 
+def test_offsets_of_a_shared_mesh_with_many_attributes_lie_alone():
+    """Blender moves the attributes that are left when one is removed: what stood for them reads freed memory."""
+    bar, _, moving = scenes.bar_with_handles()
+    scenes.decorate(bar)
+    for domain in ("POINT", "EDGE", "FACE", "CORNER"):
+        for kind in ("FLOAT", "INT", "FLOAT_COLOR", "BYTE_COLOR", "FLOAT_VECTOR", "BOOLEAN", "FLOAT2"):
+            bar.data.attributes.new(f"{domain} {kind}", kind, domain)
+    before = scenes.everything(bar)
+    bpy.context.collection.objects.link(bpy.data.objects.new("Other", bar.data))
+    for z in (0.4, 0.2):
+        moving.location.z = z
+        assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}
+        helper = inputs.get(modifier_stack.find(bar), "Offsets").data
+        names = {one.name for one in helper.attributes if not (one.is_required or one.is_internal)}
+        assert names == {"ARAP Fields"} and scenes.everything(bar) == before
+
+
 @pytest.mark.parametrize("case", ["alone", "mirror before", "shape keys"])
 def test_the_modifier_can_be_applied(case):
     bar, *_ = build(STACKS[case])
