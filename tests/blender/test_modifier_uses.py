@@ -48,7 +48,7 @@ def test_objects_that_share_a_mesh_move_alone():
 
 
 def test_offsets_of_a_shared_mesh_with_many_attributes_lie_alone():
-    """Blender moves the attributes that are left when one is removed: what stood for them reads freed memory."""
+    """Blender moves those left when one is removed: what stood for them reads freed memory."""
     bar, _, moving = scenes.bar_with_handles()
     scenes.decorate(bar)
     for domain in ("POINT", "EDGE", "FACE", "CORNER"):
