@@ -12,7 +12,8 @@ SOURCES := $(shell find native cmake -type f) CMakeLists.txt pyproject.toml
 PIP := $(PY) -m pip install --disable-pip-version-check
 PYTEST := $(PY) -m pytest
 # Files of tests are dealt out, long ones first, to as many processes as there are processors; each needs memory.
-ALL_TESTS := $(PYTEST) -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+# There, a thread of libtorch's that waits must not hold the processor that another process needs.
+ALL_TESTS := OMP_WAIT_POLICY=passive $(PYTEST) -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 # BACKEND=eigen: the library without libtorch, as wheels and zips have it, in a folder of its own beside .venv's.
 BACKEND := torch
 TORCH := $(VENV)/.torch

@@ -78,22 +78,22 @@ Fitted fitted_nodes(const RigShape& rig, PointsIn points, const std::vector<Inde
 /// Weights of points of the shape.
 RowMatrix<float> fitted_points(const RigShape& rig, const PiecePoints& given, const SkinOptions& options,
                                const Progress& progress) {
-  const Points& points = given.points;
   const std::vector<Index> near = rig.nearest_nodes(given);
-  const Fitted fitted = fitted_nodes(rig, points, near, options, progress);
+  const Fitted fitted = fitted_nodes(rig, given.points, near, options, progress);
   progress.report(0.9, "Weights");
   const VertexBlend blend(rig, given, near);
-  const RigTwins mirror(rig, points);
-  RowMatrix<float> nearby = blend(fitted.nodes), support = blend(fitted.support);
-  RowMatrix<float> distances = blend(rig.bone_distances);
-  mirror.average_alike(nearby);
-  mirror.average_alike(support);
-  mirror.average_alike(distances);
-  const LimbSides limbs(rig, given, near, distances);
+  SkinPoints points{given.points,
+                    near,
+                    blend(fitted.nodes),
+                    blend(fitted.support),
+                    blend(rig.bone_distances),
+                    RigTwins(rig, given.points)};
+  for (RowMatrix<float>* values : {&points.weights, &points.support, &points.distances})
+    points.twins.average_alike(*values);
+  const LimbSides limbs(rig, given, near, points.distances);
   progress.report(0.93, "Weights");
-  RowMatrix<float> result =
-      point_weights(rig, points, fitted.poses, nearby, support, distances, near, limbs, mirror, options);
-  mirror.average_twins(result);
+  RowMatrix<float> result = point_weights(rig, points, limbs, fitted.poses, options);
+  points.twins.average_twins(result);
   return result;
 }
 

@@ -117,23 +117,22 @@ Vector WeightFit::squared_errors(const ExamplePose& pose) const {
   return result;
 }
 
-RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::vector<ExamplePose>& poses,
-                               const RowMatrix<float>& nearby, const RowMatrix<float>& support,
-                               const RowMatrix<float>& distances, const std::vector<Index>& near,
-                               const LimbSides& limbs, const RigTwins& mirror, const SkinOptions& options) {
-  RowMatrix<float> result = RowMatrix<float>::Zero(points.rows(), rig.skeleton.count());
+RowMatrix<float> point_weights(const RigShape& rig, const SkinPoints& points, const LimbSides& limbs,
+                               const std::vector<ExamplePose>& poses, const SkinOptions& options) {
+  const auto& [places, near, weights, support, distances, twins] = points;
+  RowMatrix<float> result = RowMatrix<float>::Zero(places.rows(), rig.skeleton.count());
   const double stiff = options.smoothness * smoothness_weight;
-  parallel_for(0, points.rows(), 16, [&](Index first, Index last) {
+  parallel_for(0, places.rows(), 16, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i) {
       const BoneChoice choice(rig, near[i], distances.row(i), limbs.sides[i], limbs.shares[i]);
-      const Index twin = mirror.like(i), k = choice.count();
+      const Index twin = twins.like(i), k = choice.count();
       BoneChoice other = choice;
       if (twin >= 0)
-        for (Index& bone : other.bones) bone = mirror.bones[bone];
+        for (Index& bone : other.bones) bone = twins.bones[bone];
       BonePairs h = BonePairs::Zero(k, k);
       for (const ExamplePose& pose : poses) {
         const auto square = [&](const BoneChoice& bones, Index point) {
-          return bones.square(points.row(point), pose.motions,
+          return bones.square(places.row(point), pose.motions,
                               pose.shape.row(rig.size() + point).cast<double>(), rig.extent);
         };
         h += twin < 0 ? square(choice, i) : BonePairs(0.5 * (square(choice, i) + square(other, twin)));
@@ -141,7 +140,7 @@ RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::
       h = choice.held_back(h) * (rig.trust[near[i]] / static_cast<double>(poses.size()));
       FewBones g = -choice.penalties, wanted(k);
       for (Index j = 0; j < k; ++j) {
-        g[j] += stiff * static_cast<double>(nearby(i, choice.bones[j]));
+        g[j] += stiff * static_cast<double>(weights(i, choice.bones[j]));
         wanted[j] = static_cast<double>(support(i, choice.bones[j]));
       }
       const FewBones w = among_wanted(h, stiff, g, wanted, options.influences);

@@ -41,13 +41,20 @@ class WeightFit {
   RowMatrix<float> weights_;
 };
 
-/// Weights of other points of the shape, at most `influences` a point above 0, that reproduce the same poses,
-/// whose rows from `first` on are the points'. What the poses leave open is as in `nearby` (points, bones),
-/// the nodes' weights there, and which bones it may be says the nodes' `support` there; `distances` are to
-/// the bones through the inside, and `near` the nodes that the points are nearest to.
-RowMatrix<float> point_weights(const RigShape& rig, PointsIn points, const std::vector<ExamplePose>& poses,
-                               const RowMatrix<float>& nearby, const RowMatrix<float>& support,
-                               const RowMatrix<float>& distances, const std::vector<Index>& near,
-                               const LimbSides& limbs, const RigTwins& mirror, const SkinOptions& options);
+/// Points of a rig's shape beside its nodes, and what the nodes tell there.
+struct SkinPoints {
+  const Points& places;
+  const std::vector<Index>& near;  ///< the nodes that they are nearest to
+  RowMatrix<float> weights;        ///< (points, bones) as of WeightFit
+  RowMatrix<float> support;        ///< (points, bones) as of WeightFit
+  RowMatrix<float> distances;      ///< (points, bones) through the inside
+  RigTwins twins;
+};
+
+/// Weights of points, at most `influences` a point above 0, that reproduce the same poses, whose rows after
+/// the nodes' are the points'. What the poses leave open is as the nodes' weights there, and which bones it
+/// may be is told by their support.
+RowMatrix<float> point_weights(const RigShape& rig, const SkinPoints& points, const LimbSides& limbs,
+                               const std::vector<ExamplePose>& poses, const SkinOptions& options);
 
 }  // namespace arapfields
