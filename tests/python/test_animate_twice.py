@@ -2,14 +2,14 @@
 """Two runs of `animate` on one output: the second says so, and ends well."""
 
 import json
-import os
+import subprocess
 
 import numpy as np
 import pytest
 import trimesh
 from support.geometry.bar import LEFT, RIGHT, turned
 from support.geometry.meshes import sphere
-from support.programs.cli import run
+from support.programs.cli import process, run
 
 from arapfields._locks import lock
 from arapfields._native import InvalidInput
@@ -42,35 +42,30 @@ def place(tmp_path):
     return tmp_path
 
 
-def animate(place, *further, tracks="tracks"):
+def flags(place, *further, tracks="tracks"):
     given = [place / "bar.ply", "--tracks", place / f"{tracks}.json", "-o", place / "x.pc2"]
-    return run("animate", *given, *QUICK, *further)
+    return "animate", *given, *QUICK, *further
 
 
-def in_child(work):
-    """work() in another process, whose locks are its own; its exit code."""
-    child = os.fork()
-    if child == 0:
-        try:
-            code = work()
-        except BaseException:
-            code = 9
-        os._exit(code)
-    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+def other(arguments):
+    """The command in another process, whose locks are its own: exit code, and what it says."""
+    command, environment = process(*arguments)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
 def test_the_second_of_two_says_so(place, capfd):
     store = place / ".x.pc2.frames"
-    assert animate(place, "--shard", "1/2") == 0  # leaves its frames, and what it was to make
-    capfd.readouterr()
+    part = "--shard", "1/2"
+    assert run(*flags(place, *part)) == 0  # leaves its frames, and what it was to make
     with open(store / "lock-1-2", "r+b") as file:
         lock(file)
-        assert in_child(lambda: animate(place, "--shard", "1/2")) == 0
-        assert "another animate is at work on the same frames" in capfd.readouterr().out
-        assert in_child(lambda: animate(place, "--shard", "1/2", tracks="other")) == 2
-        assert "another run, of other frames" in capfd.readouterr().err
-    assert animate(place) == 0
+        code, said = other(flags(place, *part))
+        assert code == 0 and "another animate is at work on the same frames" in said
+        code, said = other(flags(place, *part, tracks="other"))
+        assert code == 2 and "another run, of other frames" in said
+    capfd.readouterr()
+    assert run(*flags(place)) == 0
     assert "wrote" in capfd.readouterr().out and not store.exists()
 
 

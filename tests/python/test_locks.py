@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from arapfields._locks import lock, unlock
 
-THREADS, ROUNDS = 8, 300
+THREADS, ROUNDS = 8, 100
 LOCK_ALL = """
 import sys
 from arapfields._locks import lock

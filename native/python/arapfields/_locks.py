@@ -14,11 +14,13 @@ else:
     import fcntl
 
 PAUSE = 0.05  # seconds between tries, where the system does not wait itself
-LARGEST = 2**31 - 1  # Windows takes positions of 32 bits; the byte need not exist
+# Windows takes positions of 32 bits; the byte need not exist. There nobody else reads what is locked: the
+# default lies behind what a file holds.
+LARGEST = 2**31 - 1
 POSITION = threading.Lock()  # Windows locks at the file's position, which threads share
 
 
-def lock(file, byte=0, wait=True):
+def lock(file, byte=LARGEST, wait=True):
     """Takes a byte's lock. PermissionError or BlockingIOError where another process has it and `wait` is off,
     OSError where the file system has no locks."""
     if sys.platform != "win32":
@@ -36,7 +38,7 @@ def lock(file, byte=0, wait=True):
         time.sleep(PAUSE)
 
 
-def unlock(file, byte=0):
+def unlock(file, byte=LARGEST):
     """Gives it back; nothing where that cannot be."""
     with contextlib.suppress(OSError):
         if sys.platform != "win32":
