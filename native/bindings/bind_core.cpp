@@ -100,7 +100,7 @@ Positions (n, 3) of the watched points in the latest preview, in single precisio
       .def(
           "to_mesh", [](const Frame& f, const ArrayArgument& p) { return f.to_mesh(as_points(p, "points")); },
           "points"_a)
-      .def("__eq__", [](const Frame& a, const Frame& b) { return a == b; });
+      .def("__eq__", [](const Frame& a, const Frame& b) { return a == b; }, py::is_operator());
 
   module.def("thread_count", &thread_count,
              "Threads that native calls use unless their options say otherwise.");

@@ -5,6 +5,7 @@ Arrays are NumPy, all coordinates are the mesh's own; distances are negative ins
 """
 
 from . import _libtorch as _libtorch  # first, since it compares torch's version before anything is loaded
+from ._copying import register as _register_copies
 from ._native import (
     Attachment,
     Bone,
@@ -103,6 +104,8 @@ from .reports import (
     SolveReport,
     WrapReport,
 )
+
+_register_copies()
 
 # The shorter and the older names.
 Cuboid = CuboidHandle
