@@ -96,7 +96,8 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
         shown = named + visibility.hidden_note(visibility.show_alone(owner, item))
         return describe(shown.strip(), solved.report, np.ptp(surface.vertices, axis=0).max())
 
-    return Item(source.name, work, apply, preview)
+    edits = () if result == "NEW" else (surface.reference,)
+    return Item(source.name, work, apply, preview, edits)
 
 
 class SolveOperator(JobOperator):

@@ -37,18 +37,20 @@ def refusal(source):
     return None
 
 
-def bind(context, source):
+def bind(context, source, expected=None):
     """Gives the object its modifier and a mesh that carries the offsets, none yet; returns the modifier.
 
     Where there is one already, its place and inputs stay, and its motion where the points are as many.
+    UserError where the points are not as many as `expected`.
     """
-    modifier = modifier_stack.find(source)
-    armatures.silence(source)
-    copied = None
-    cache_modifier.suspend(source)
+    modifier, copied = modifier_stack.find(source), None
     with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
         normals, count = modifier_stack.free_normals(mesh), len(points_of(mesh))
         splats = splat_layouts.columns_of(mesh)
+    if expected not in (None, count):
+        raise UserError("{name} changed while it was worked on; run again", source)
+    armatures.silence(source)
+    cache_modifier.suspend(source)
     on_mesh = lies_on_mesh(source)
     if splats and not on_mesh:
         raise UserError("{name}: its splats need data and a first modifier of their own", source)

@@ -131,7 +131,7 @@ class JobOperator(ModalRun, Guided):
             elif outcome.error:
                 self.failures.append(named(outcome.item.label, outcome.error))
             else:
-                cancelled |= yield from self.apply_one(outcome)
+                cancelled |= yield from self.apply_one(job, outcome)
         if cancelled and not self.successes and not self.failures:
             self.add_message("INFO", translated("{job} cancelled", job=translated(self.title)))
             return {"CANCELLED"}
@@ -143,9 +143,11 @@ class JobOperator(ModalRun, Guided):
             self.add_message("ERROR" if not self.successes else "WARNING", text)
         return {"FINISHED"} if self.successes else {"CANCELLED"}
 
-    def apply_one(self, outcome):
+    def apply_one(self, job, outcome):
         """Puts one item's result into the scene; returns whether the user cancelled meanwhile."""
         try:
+            for reference in outcome.item.edits if self.in_window else ():
+                yield from until_left(job, reference)
             text = outcome.item.apply(outcome.value)
             if isinstance(text, types.GeneratorType):
                 text = yield from text
@@ -169,6 +171,13 @@ def with_progress(job, coroutine, label):
             yield next(coroutine)
         except StopIteration as ended:
             return ended.value
+
+
+def until_left(job, reference):
+    """Coroutine that waits while an object is in Edit Mode, whose end undoes what is written meanwhile."""
+    while (item := reference.find()) is not None and item.mode == "EDIT":
+        job.report_main_thread(1.0, translated(refusal(item)))
+        yield Pause.WORKER
 
 
 def busy():

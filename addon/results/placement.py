@@ -75,7 +75,7 @@ def place_result(context, source, kind, output, result, moved, before):
         return new_object(context, source, kind, output, moved, before)
     refuse(refusal(source, output, result))
     if keeps_mesh(output, result):
-        motion.bind(context, source)
+        motion.bind(context, source, len(before))
         motion.write(source, motion.Motion(moved.vertices - before, moved.turns, moved.changes))
         layers.note(source, kind)
         source[REPORT] = json.dumps(moved.report)

@@ -106,7 +106,7 @@ class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
             used = np.count_nonzero(sum(np.asarray(own).max(axis=0) > 0 for own in weights))
             return translated("{count} bones move {meshes}", count=used, meshes=names_of(items))
 
-        return Item(rig.name, work, apply)
+        return Item(rig.name, work, apply, edits=tuple(shape.reference for shape in read))
 
 
 def names_of(items):

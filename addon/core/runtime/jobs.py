@@ -19,12 +19,14 @@ class Item:
 
     `apply` returns the line to report, or is a coroutine (runtime/coroutines.py) that does.
     `preview`, if any, has `show(points)`, `clear()`, and shows the tracker's preview points.
+    `edits` are references to the objects whose mesh `apply` writes.
     """
 
     label: str
     work: Callable[[ProgressTracker], Any]
     apply: Callable[[Any], Any] | None = None
     preview: Any = None
+    edits: tuple = ()
 
 
 @dataclass
