@@ -19,6 +19,9 @@ class FakeTask:
     def __init__(self):
         self.progress, self.message, self.cancelled = 0.0, "", False
 
+    def watch(self, points):
+        pass
+
     def cancel(self):
         self.cancelled = True
 
@@ -40,6 +43,17 @@ def run(*works):
     job.start()
     assert job.join(PATIENCE)
     return job
+
+
+def test_what_the_worker_published_is_gone_once_it_has_ended():
+    """The main thread may still wait to apply it, and looks at what is shown."""
+
+    def work(tracker):
+        tracker.rest_preview_points = [(0.0, 0.0, 0.0)]
+        task = tracker.start("Working", 1.0)
+        task.looks, task.watched = 1, tracker.rest_preview_points
+
+    assert run(work).preview_points() == (None, 0, None)
 
 
 def test_every_item_has_its_outcome_though_one_fails():

@@ -71,10 +71,11 @@ class Job:
         self._main_thread = fraction, message
 
     def preview_points(self):
-        """(the item at work, how often its preview points were published, where they are)."""
+        """(item at work, how often it published preview points, where they are), or (None, 0, None)."""
         with self._lock:
-            item = self.items[self._current] if self._current < len(self.items) else None
-            tracker = self._tracker
+            if self._current >= len(self.items):
+                return None, 0, None
+            item, tracker = self.items[self._current], self._tracker
         return item, *tracker.preview_points()
 
     def cancel(self):
