@@ -105,7 +105,7 @@ from .reports import (
     WrapReport,
 )
 
-_register_copies()
+_register_copies(globals())
 
 # The shorter and the older names.
 Cuboid = CuboidHandle
