@@ -10,6 +10,7 @@ from .live_object import LiveObject
 class Former(NamedTuple):
     """What stays of a session that has ended, for one that takes its place."""
 
+    uid: int  # session_uid of its source
     display: Any
     carried: dict  # what carried objects had before
     keeps_shape: bool

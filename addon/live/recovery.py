@@ -55,6 +55,8 @@ def bring_back(source):
     """Whether the session by which the source was live comes back; a live object without one goes."""
     number = settings_of(source).live_number
     former = live.past.get(number)
+    if former is not None and former.uid != source.session_uid:
+        return forget_copy(source)
     if former is None or not former.display.in_place:
         stored.put_mark(source, "")
         return discard_live_object(source)
@@ -64,19 +66,24 @@ def bring_back(source):
 
 
 def disown(item):
-    """An object that says it is live without a session of its own: a copy of one that is, whose shape is the
-    copy's own, or one from another file."""
+    """An object that says it is live without a session of its own: a copy of one that is, or one from another
+    file."""
     settings = settings_of(item)
     if not settings.live_kind or is_live(item) or item.session_uid in (live.begun, *live.returning):
         return
     if any(session.number == settings.live_number for session in live.values()):
-        visibility.forget(item)
-        if item.data.users == 1:
-            stored.put_mark(item, "")
-        live_object.forget_result(item)
+        forget_copy(item)
     else:
         adopt(item)
     settings.live_kind = ""
+
+
+def forget_copy(item):
+    """What a copy of a live object shows is its own."""
+    visibility.forget(item)
+    if item.data.users == 1:
+        stored.put_mark(item, "")
+    live_object.forget_result(item)
 
 
 def discard_live_object(source):

@@ -103,7 +103,7 @@ class Session:
 
     @property
     def former(self):
-        return Former(self.display, self.carrying.before, self.keeps_shape, self.gone)
+        return Former(self.source.uid, self.display, self.carrying.before, self.keeps_shape, self.gone)
 
     def stop(self):
         self._reading.close()

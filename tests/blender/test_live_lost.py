@@ -167,3 +167,25 @@ def test_what_was_live_in_another_file_is_not_live_where_it_is_appended(tmp_path
         assert bpy.ops.arapfields.live() == bpy.ops.arapfields.live() == {"FINISHED"}
         step(refined=True)
         assert np.array_equal(scenes.world_points(bar), shown)
+
+
+def test_a_copy_of_a_live_object_does_not_come_back_live():
+    """One that was never active, and so still says that it is live by the session of the other."""
+    bpy.context.preferences.edit.use_global_undo = True
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.4
+    step(refined=True)
+    bpy.ops.ed.undo_push(message="live")
+    shown, copied = scenes.world_points(bar), bar.copy()
+    copied.data = bar.data.copy()
+    bpy.context.collection.objects.link(copied)
+    bpy.ops.ed.undo_push(message="copied")
+    for change in (bpy.ops.ed.undo, bpy.ops.ed.undo, bpy.ops.ed.redo, bpy.ops.ed.redo):
+        change()
+        step(refined=True)
+    bar, copied = bpy.data.objects["Bar"], bpy.data.objects["Bar.001"]
+    assert sessions.is_live(bar) and not sessions.is_live(copied) and not copied.arapfields.live_kind
+    assert np.array_equal(scenes.world_points(bar), shown)
+    assert np.array_equal(scenes.world_points(copied), shown)
