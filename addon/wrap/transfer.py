@@ -125,7 +125,7 @@ class Transfer:
             key = made[block.name]
             mesh_arrays.put_vectors(key.data, shape_of(block), "co")
             key.relative_key = made[block.relative_key.name]
-            for name in ("slider_min", "slider_max", "value", "mute", "vertex_group", "interpolation"):
+            for name in ("slider_min", "slider_max", "mute", "vertex_group", "interpolation"):
                 setattr(key, name, getattr(block, name))
         return len(blocks)
 
