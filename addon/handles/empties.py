@@ -27,7 +27,7 @@ def rest_box(source, entry, where=matrix_of):
 def store_rest(source, entry):
     """Makes where the handle's Empty or bone is now its rest pose."""
     relative = inverse(matrix_of(source)) @ box_now(entry)
-    entry.rest = relative.ravel()
+    entry.rest, entry.unwrapped = relative.ravel(), np.zeros(16)
 
 
 def used(source):

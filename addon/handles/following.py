@@ -8,6 +8,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..blender import mesh_arrays, modifier_stack
+from ..blender.object_references import settings_of
 from ..core.geometry.box_fit import followed_box
 from ..core.geometry.spaces import inverse, transform
 from ..field_modifier import layers
@@ -21,9 +22,11 @@ class Followers:
     def __init__(self, context, source):
         entries = [entry for entry in empties.used(source) if entry.kind != "BONE"]
         self.before = seen(context, source) if entries else None
+        self.is_wrapped = settings_of(source).moved_by == "WRAP"
 
-    def follow(self, context, source):
-        """Moves handles at rest, and their Empties as far, to where the surface is now."""
+    def follow(self, context, source, back=False):
+        """Moves handles at rest, and their Empties as far, to where the surface is now; `back` to where they
+        were before a wrap took them along."""
         after = None if self.before is None else seen(context, source)
         if after is None or len(after) != len(self.before) or np.array_equal(after, self.before):
             return
@@ -32,16 +35,24 @@ class Followers:
             if entry.kind == "BONE" or not is_free(entry.empty):
                 continue
             rest, now = world @ rest_of(entry), box_now(entry)
-            box = followed_box(rest, self.before, after, is_box=entry.kind == "CUBE")
-            moved.append((entry, box, np.allclose(rest, now, rtol=0, atol=1e-5 * np.abs(rest[:3, :3]).max())))
+            unwrapped = np.array(entry.unwrapped, dtype=np.float64).reshape(4, 4)
+            was_taken = self.is_wrapped and unwrapped.any()
+            unwrapped = unwrapped if was_taken else rest_of(entry)
+            if back and was_taken:
+                box = world @ unwrapped
+            else:
+                box = followed_box(rest, self.before, after, is_box=entry.kind == "CUBE")
+            is_at_rest = np.allclose(rest, now, rtol=0, atol=1e-5 * np.abs(rest[:3, :3]).max())
+            moved.append((entry, box, is_at_rest, unwrapped))
             motion = box @ inverse(rest) @ np.array(entry.empty.matrix_world, dtype=np.float64)
             entry.empty.matrix_world = Matrix(motion.tolist())
         context.view_layer.update()
-        for entry, box, is_at_rest in moved:
+        for entry, box, is_at_rest, unwrapped in moved:
             if is_at_rest:
                 empties.store_rest(source, entry)
             else:
                 entry.rest = (inverse(world) @ box).ravel()
+            entry.unwrapped = np.zeros(16) if back else unwrapped.ravel()
         held_counts.count_inside(context, source, at_once=True)
 
 

@@ -65,6 +65,11 @@ class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
         name="Rest Box",
         description="The cube [-1, 1]³ → the object's coordinates, at rest (row by row)",
     )
+    unwrapped: bpy.props.FloatVectorProperty(
+        size=16,
+        name="Rest Box before the Wrap",
+        description="Where the rest box was before a wrap took it along; zeros where none did",
+    )
     inside: integer(
         "Points Inside",
         "How many of 4000 points of the surface the handle held when its rest pose was stored; "

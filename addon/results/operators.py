@@ -75,7 +75,7 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
         carried_objects.give_back_all(source)
         helper.clear(source)
         if followers is not None:
-            followers.follow(context, source)
+            followers.follow(context, source, back=True)
 
 
 class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
