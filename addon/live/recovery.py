@@ -73,8 +73,10 @@ def disown(item):
         return
     if any(session.number == settings.live_number for session in live.values()):
         forget_copy(item)
-    else:
+    elif item.library is None:
         adopt(item)
+    else:
+        live_object.forget(item)
     settings.live_kind = ""
 
 

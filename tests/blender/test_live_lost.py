@@ -12,6 +12,7 @@ if IN_BLENDER:
     from support.blender.live import step
     from support.blender.pins import pin
     from support.blender.scenes import delete
+    from support.blender.stages import watched
 
     from addon.blender import modifier_stack
     from addon.core.runtime import jobs
@@ -189,3 +190,19 @@ def test_a_copy_of_a_live_object_does_not_come_back_live():
     assert sessions.is_live(bar) and not sessions.is_live(copied) and not copied.arapfields.live_kind
     assert np.array_equal(scenes.world_points(bar), shown)
     assert np.array_equal(scenes.world_points(copied), shown)
+
+
+def test_a_linked_object_and_its_live_one_are_left_as_they_are(tmp_path):
+    bar, *_ = scenes.bar_with_handles()
+    bar.arapfields.result = "NEW"
+    bpy.ops.arapfields.live()
+    bpy.data.libraries.write(str(tmp_path / "live.blend"), {bar, bpy.data.objects["Bar_live"]})
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with watched() as errors:
+        for name in ("Bar_live", "Bar"):
+            bpy.ops.wm.link(directory=str(tmp_path / "live.blend/Object"), filename=name)
+        bar = bpy.data.objects["Bar"]
+        bpy.context.view_layer.objects.active = bar
+        bpy.context.view_layer.update()
+    assert not errors and not bar.arapfields.live_kind
+    assert "Bar_live" in bpy.context.scene.objects
