@@ -21,17 +21,19 @@ using namespace wrap_parameters;
 
 constexpr Index block_size = 16;
 
-using MatrixF = RowMatrix<float>;
 using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 /// What a block of 16 neighbouring points contributes to the normal equations, in terms of the basis
 /// functions whose support it meets.
+template <typename Scalar>
 struct PointBlock {
+  using Matrix = RowMatrix<Scalar>;
+
   std::vector<Index> functions;  // ascending
-  MatrixF values;                // (functions, points)
-  MatrixF gradients;             // (functions, 6 points): weighted, along the columns of J and along the axes
-  MatrixF right_hand_side;       // (functions, 3)
-  Eigen::Matrix<float, block_size, 6> forms;
+  Matrix values;                 // (functions, points)
+  Matrix gradients;              // (functions, 6 points): weighted, along the columns of J and along the axes
+  Matrix right_hand_side;        // (functions, 3)
+  Eigen::Matrix<Scalar, block_size, 6> forms;
 
   PointBlock(const RadialBlock<double>& block, Index first, Index centers, const MotionStiffness& stiffness,
              const CorrespondenceTerms& correspondences) {
@@ -46,9 +48,9 @@ struct PointBlock {
     std::vector<double> rows(count * 4 * block_size);
     ARAPFIELDS_DISPATCH(radial_rows(block, 4, rows.data()));
     const auto row = [&](Index a, int c, Index p) {
-      return static_cast<float>(rows[(a * 4 + c) * block_size + p]);
+      return static_cast<Scalar>(rows[(a * 4 + c) * block_size + p]);
     };
-    MatrixF slopes = MatrixF::Zero(all, 3);  // derivatives of the basis functions at one point
+    Matrix slopes = Matrix::Zero(all, 3);  // derivatives of the basis functions at one point
     slopes.bottomRows(3).setIdentity();
     const Index valid = std::min<Index>(block_size, stiffness.points.rows() - first);
     for (Index p = 0; p < valid; ++p) {
@@ -57,22 +59,23 @@ struct PointBlock {
         values(a, p) = row(a, 0, p);
         for (int k = 0; k < 3; ++k) slopes(a, k) = row(a, 1 + k, p);
       }
-      values(count, p) = 1.0F;
-      values.col(p).tail<3>() = stiffness.points.row(i).transpose().cast<float>();
-      forms.row(p) = correspondences.forms.row(i).cast<float>();
-      right_hand_side.noalias() += values.col(p) * correspondences.right_hand_sides.row(i).cast<float>();
+      values(count, p) = 1;
+      values.col(p).template tail<3>() = stiffness.points.row(i).transpose().template cast<Scalar>();
+      forms.row(p) = correspondences.forms.row(i).template cast<Scalar>();
+      right_hand_side.noalias() +=
+          values.col(p) * correspondences.right_hand_sides.row(i).template cast<Scalar>();
       const Mat3 jacobian = Eigen::Map<const RowMat3>(&stiffness.jacobians(i, 0));
       add_stiffness(p, closest_rotation(jacobian) - jacobian,
-                    stiffness.at_rest ? slopes : MatrixF(slopes * jacobian.cast<float>()),
-                    static_cast<float>(stiffness.rigidity[i]), static_cast<float>(stiffness.viscosity[i]),
+                    stiffness.at_rest ? slopes : Matrix(slopes * jacobian.template cast<Scalar>()),
+                    static_cast<Scalar>(stiffness.rigidity[i]), static_cast<Scalar>(stiffness.viscosity[i]),
                     slopes);
     }
   }
 
  private:
-  void add_stiffness(Index p, const Mat3& missing, const MatrixF& along, float rigidity, float viscosity,
-                     const MatrixF& slopes) {
-    right_hand_side.noalias() += rigidity * along * missing.cast<float>().transpose();
+  void add_stiffness(Index p, const Mat3& missing, const Matrix& along, Scalar rigidity, Scalar viscosity,
+                     const Matrix& slopes) {
+    right_hand_side.noalias() += rigidity * along * missing.template cast<Scalar>().transpose();
     for (int k = 0; k < 3; ++k) {
       gradients.col(k * block_size + p) = std::sqrt(rigidity) * along.col(k);
       gradients.col((3 + k) * block_size + p) = std::sqrt(viscosity) * slopes.col(k);
@@ -80,34 +83,36 @@ struct PointBlock {
   }
 };
 
-std::vector<PointBlock> point_blocks(const RadialBasis& basis, const MotionStiffness& stiffness,
-                                     const CorrespondenceTerms& correspondences) {
+template <typename Scalar>
+std::vector<PointBlock<Scalar>> point_blocks(const RadialBasis& basis, const MotionStiffness& stiffness,
+                                             const CorrespondenceTerms& correspondences) {
   const RadialEvaluator<double> field(basis, stiffness.points, JetOrder::first);
-  std::vector<std::optional<PointBlock>> blocks(field.blocks());
+  std::vector<std::optional<PointBlock<Scalar>>> blocks(field.blocks());
   parallel_for(0, field.blocks(), 4, [&](Index first, Index last) {
     for (Index b = first; b < last; ++b)
       blocks[b].emplace(field.block(b), b * block_size, basis.center_count(), stiffness, correspondences);
   });
-  std::vector<PointBlock> result;
+  std::vector<PointBlock<Scalar>> result;
   for (auto& block : blocks) result.push_back(std::move(*block));
   return result;
 }
 
 /// The lower triangle (size, size) of the matrix that all coordinates share (entry −1: stiffness), or that
 /// couples two of them (0 to 5: xx, yy, zz, xy, xz, yz: correspondences).
-RowMatrix<double> matrix_of(const std::vector<PointBlock>& blocks, Index size, int entry,
+template <typename Scalar>
+RowMatrix<double> matrix_of(const std::vector<PointBlock<Scalar>>& blocks, Index size, int entry,
                             const Progress& progress) {
   RowMatrix<double> sum = RowMatrix<double>::Zero(size, size);
-  MatrixF product, scaled;
-  for (const PointBlock& block : blocks) {
+  RowMatrix<Scalar> product, scaled;
+  for (const PointBlock<Scalar>& block : blocks) {
     if (progress.cancelled()) break;
     const auto count = static_cast<Index>(block.functions.size());
     product.resize(count, count);
     if (entry < 0) {
-      lower_gram<float>(Transpose::no, block.gradients, 0.0F, product);
+      lower_gram<Scalar>(Transpose::no, block.gradients, 0, product);
     } else {
       scaled = block.values * block.forms.col(entry).asDiagonal();
-      gemm<float>(Transpose::no, Transpose::yes, 1.0F, scaled, block.values, 0.0F, product);
+      gemm<Scalar>(Transpose::no, Transpose::yes, 1, scaled, block.values, 0, product);
     }
     for (Index i = 0; i < count; ++i) {
       double* row = &sum(block.functions[i], 0);
@@ -117,11 +122,12 @@ RowMatrix<double> matrix_of(const std::vector<PointBlock>& blocks, Index size, i
   return sum;
 }
 
-RowMatrix<double> right_hand_side_of(const std::vector<PointBlock>& blocks, Index size) {
+template <typename Scalar>
+RowMatrix<double> right_hand_side_of(const std::vector<PointBlock<Scalar>>& blocks, Index size) {
   RowMatrix<double> sum = RowMatrix<double>::Zero(size, 3);
-  for (const PointBlock& block : blocks)
+  for (const PointBlock<Scalar>& block : blocks)
     for (std::size_t i = 0; i < block.functions.size(); ++i)
-      sum.row(block.functions[i]) += block.right_hand_side.row(i).cast<double>();
+      sum.row(block.functions[i]) += block.right_hand_side.row(i).template cast<double>();
   return sum;
 }
 
@@ -148,16 +154,16 @@ RowMatrix<double> regularized_cholesky(RowMatrix<double>& matrix) {
   }
 }
 
-}  // namespace
-
-RowMatrix<double> solve_velocity(const RadialBasis& basis, const MotionStiffness& stiffness,
-                                 const CorrespondenceTerms& correspondences, const LandmarkTerm& landmarks,
-                                 const Progress& progress) {
+/// solve_velocity() with products of this precision.
+template <typename Scalar>
+RowMatrix<double> solution_of(const RadialBasis& basis, const MotionStiffness& stiffness,
+                              const CorrespondenceTerms& correspondences, const LandmarkTerm& landmarks,
+                              const Progress& progress) {
   constexpr int entry_of[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
   const Index size = basis.size();
 
   // Terms of the surface's points.
-  const std::vector<PointBlock> blocks = point_blocks(basis, stiffness, correspondences);
+  const std::vector<PointBlock<Scalar>> blocks = point_blocks<Scalar>(basis, stiffness, correspondences);
   progress.check();
   std::array<RowMatrix<double>, 7> matrices;  // the first is shared by the coordinates
   parallel_jobs(
@@ -185,6 +191,16 @@ RowMatrix<double> solve_velocity(const RadialBasis& basis, const MotionStiffness
   progress.check();
   const RowMatrix<double> solution = cholesky_solve<double>(regularized_cholesky(matrix), right_hand_side);
   return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>>(solution.data(), size, 3);
+}
+
+}  // namespace
+
+RowMatrix<double> solve_velocity(const RadialBasis& basis, const MotionStiffness& stiffness,
+                                 const CorrespondenceTerms& correspondences, const LandmarkTerm& landmarks,
+                                 const Progress& progress) {
+  // Points that are held weigh more beside stiffness than single precision resolves.
+  return stiffness.at_rest ? solution_of<double>(basis, stiffness, correspondences, landmarks, progress)
+                           : solution_of<float>(basis, stiffness, correspondences, landmarks, progress);
 }
 
 }  // namespace arapfields

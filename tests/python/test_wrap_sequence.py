@@ -12,6 +12,7 @@ NOISE = 0.003  # of the diagonal, along each axis; new in each frame
 MOTION_OF_WHAT_IS_STILL = 0.5
 SLIDING = 0.3  # of the tip's way: its round end, stretched on one side, may slide along itself
 OPTIONS = af.WrapOptions(alignment="none", centers=200, stages=3, iterations=6)
+ROUNDING = 1e-9
 OFF = 0.005  # of the diagonal, on average from the surface without noise
 
 
@@ -58,6 +59,18 @@ def test_what_is_still_moves_less_than_the_noise(played):
     noise = NOISE * np.sqrt(3)
     assert np.sqrt((steps**2).mean()) < MOTION_OF_WHAT_IS_STILL * noise
     assert steps.max() < noise
+
+
+def test_rounding_moves_nothing(played):
+    """In single precision it moved points by a tenth of the noise, in some frames by twice the noise."""
+    v, _, true, *_, samples = played
+    shapes = []
+    for moved in (0, ROUNDING):
+        vertices, faces = true[1]
+        first = af.wrap(samples, af.MeshSdf(*true[0]), [], OPTIONS)
+        target = af.MeshSdf(vertices + moved * np.sin(np.arange(vertices.size)).reshape(-1, 3), faces)
+        shapes.append(af.WrapSequence(samples, first, OPTIONS).next(target)(v))
+    assert np.abs(shapes[1] - shapes[0]).max() < 1e3 * ROUNDING
 
 
 def test_a_frames_field_is_kept_in_a_file(played, tmp_path):
