@@ -29,9 +29,10 @@ Mat3 random_rotation(const Bone& bone, Random& random) {
 }
 
 /// With surfaces that cut each other, parts that other bones move are far from each other; else the solver's.
-std::shared_ptr<const RestShape> rest_shape(const RigShape& rig, std::uint64_t seed) {
+std::shared_ptr<const RestShape> rest_shape(const RigShape& rig, std::uint64_t seed,
+                                            const Progress& progress) {
   if (!rig.cuts_itself()) return nullptr;
-  return std::make_shared<const RestShape>(rig.samples, true, seed, -1, [&](Index i, Index j) {
+  return std::make_shared<const RestShape>(rig.samples, true, seed, progress, -1, [&](Index i, Index j) {
     return rig.may_join(rig.sample_nodes[i], rig.sample_nodes[j]);
   });
 }
@@ -41,7 +42,8 @@ std::shared_ptr<const RestShape> rest_shape(const RigShape& rig, std::uint64_t s
 ExamplePoses::ExamplePoses(const RigShape& rig, PointsIn points, const SkinOptions& options,
                            const Progress& progress)
     : rig_(rig),
-      solver_(rig.samples, rig.handles, solver_options(options), progress, rest_shape(rig, options.seed)),
+      solver_(rig.samples, rig.handles, solver_options(options), progress,
+              rest_shape(rig, options.seed, progress)),
       points_(points) {
   solver_.track(points);
 }

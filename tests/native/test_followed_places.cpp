@@ -46,7 +46,7 @@ BOOST_AUTO_TEST_SUITE(followed_places)
 
 BOOST_AUTO_TEST_CASE(solvers_on_one_shape_share_them_and_a_cancel_is_heard) {
   const SurfaceSamples samples = rough_ball();
-  const RestShape shape(samples, false, 0);
+  const RestShape shape(samples, false, 0, Progress());
   const ThreadScope threads(1);
   std::clock_t last = 0, longest = 0;
   const auto look = [&] {

@@ -184,7 +184,7 @@ BOOST_AUTO_TEST_CASE(solvers_at_once_share_obstacles_and_rest_shape) {
   const SurfaceSamples samples = two_balls();
   const Contact contact = all_about();
   const LiveOptions options = small_options(1);
-  const auto shape = std::make_shared<const RestShape>(samples, options.interior, 0);
+  const auto shape = std::make_shared<const RestShape>(samples, options.interior, 0, Progress());
   std::ptrdiff_t held = 0;
   const PointsF alone = pressed(samples, contact, shape, 1, held);
   BOOST_CHECK_GT(held, 0);

@@ -9,6 +9,7 @@ from support.geometry import cases
 
 import arapfields as af
 
+AT_ONCE = 0.01  # of the time of a solve of one iteration; what takes long before it took 0.05
 A_PART = 0.25  # of the shortest iteration seen; a check follows each of its several hundred pieces
 
 
@@ -35,3 +36,20 @@ def test_a_cancel_does_not_wait_for_the_iteration():
     thread.join()
     assert ended[0] - cancelled < A_PART * iteration
     assert len(moments) < options.iterations
+
+
+def seconds(task, **options):
+    """Processor time of a solve of one iteration."""
+    samples, handles = cases.bar_samples(20_000), cases.bar_handles(40.0)
+    before = time.process_time()
+    try:
+        af.deform(samples, handles, af.DeformOptions(iterations=1, threads=1, **options), task=task)
+    except af.Cancelled:
+        assert task.cancelled
+    return time.process_time() - before
+
+
+def test_what_is_cancelled_before_it_begins_ends_at_once():
+    task = af.Task()
+    task.cancel()
+    assert seconds(task) < AT_ONCE * seconds(af.Task())

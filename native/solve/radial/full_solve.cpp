@@ -152,7 +152,7 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
     return exact != nullptr ? exact->around(std::move(field)) : field;
   };
   const auto shape = std::make_shared<const RestShape>(
-      samples, fine.interior, static_cast<std::uint64_t>(options.training.seed), axis);
+      samples, fine.interior, static_cast<std::uint64_t>(options.training.seed), progress, axis);
   std::shared_ptr<RadialField> first;
   if (exact != nullptr || fine.fine_centers >= worth_a_first) {
     LiveOptions few = live_options(options);
@@ -211,8 +211,8 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   live.gauss_weight = options.gauss_weight / options.rigidity;
   live.keep_stance = options.keep_stance / options.rigidity;
   live.interior = !handles.empty();  // a style alone acts everywhere alike
-  const auto shape = std::make_shared<const RestShape>(samples, live.interior,
-                                                       static_cast<std::uint64_t>(options.training.seed));
+  const auto shape = std::make_shared<const RestShape>(
+      samples, live.interior, static_cast<std::uint64_t>(options.training.seed), progress);
   LiveOptions few = live;
   few.samples = style_first_samples;
   few.fine_centers = style_first_centers;

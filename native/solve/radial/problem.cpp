@@ -30,7 +30,7 @@ RadialProblem::RadialProblem(const SurfaceSamples& surface, const LiveOptions& s
   const auto seed = static_cast<std::uint64_t>(options.seed);
   // Deform and stylize, which hand a shape in, need the field off the surface as well.
   const bool two_layers = shape || options.fine_centers >= worth_two_layers;
-  if (!shape) shape = std::make_shared<const RestShape>(samples, options.interior, seed, axis);
+  if (!shape) shape = std::make_shared<const RestShape>(samples, options.interior, seed, progress, axis);
   Random random(seed);
   const std::vector<Index> chosen = stratified(shape->order, options.samples, random);
   add_energy_samples(chosen);

@@ -18,12 +18,15 @@ constexpr std::uint64_t stream = 2;
 
 }  // namespace
 
-RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed, int axis,
-                     const MayJoin& may_join)
+RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed,
+                     const Progress& progress, int axis, const MayJoin& may_join)
     : seed_(seed) {
   require_samples(samples);
+  progress.check();
   order = canonical_order(samples.points);
+  progress.check();
   thickness = std::make_shared<const LocalThickness>(samples.points, samples.normals, order);
+  progress.check();
   Random random(seed, stream);
   const std::vector<Index> chosen = stratified(order, most_sites, random);
   sites = rows_of(samples.points, chosen);
@@ -41,6 +44,7 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
     layout = std::move(half.layout);
   }
   if (!interior || normals.rows() == 0) return;
+  progress.check();
   const MayJoin sites_may_join = [&](Index i, Index j) { return may_join(chosen[i], chosen[j]); };
   embedding = interior_embedding(sites, normals, axis, may_join ? sites_may_join : MayJoin());
 }

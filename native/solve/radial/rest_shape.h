@@ -19,9 +19,9 @@ namespace arapfields {
 struct RestShape {
   /// `interior`: whether ways through the interior are looked for; `axis`: 0, 1 or 2 where fields are to be
   /// symmetric across the plane on which that coordinate is 0. Throws InvalidInput for no samples and for NaN
-  /// or infinity among them. `may_join` is of samples, as interior_embedding() has it.
-  RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed, int axis = -1,
-            const MayJoin& may_join = {});
+  /// or infinity among them, Cancelled. `may_join` is of samples, as interior_embedding() has it.
+  RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed, const Progress& progress,
+            int axis = -1, const MayJoin& may_join = {});
 
   /// What contact follows of these samples, chosen when it is first asked for. Throws Cancelled.
   std::shared_ptr<const FollowedPlaces> followed(const SurfaceSamples& samples,
