@@ -20,7 +20,7 @@ FINE = {"dodecahedron", "icosahedron"}  # with many faces: their share of the ar
 # the price of not leaning.
 MOST_LOST = 0.06
 # Free, a figure leans by ten degrees into the faces of this one: standing upright costs area.
-LEANING, LOST_OF_LEANING = "triangular pyramid", 0.1
+LEANING, LOST_OF_LEANING = "triangular pyramid", 0.09
 QUICK = ["cube", "octahedron", "icosahedron", "square pyramid", "plane pair"]
 
 
