@@ -12,6 +12,7 @@ PROPERTY = "arapfields"  # object.arapfields
 BONE_NUMBER = "arapfields_number"  # of a bone that is a handle; it stays where the bone is renamed
 REPORT = "arapfields_report"  # custom property of results: figures as JSON
 CORRECTIVE = "ARAP Corrective "  # how names of shape keys begin that go with skin weights
+NEUTRAL_KEY = "ARAP Neutral"  # shape key that takes back the values that a wrap was made with
 WARP_KEY = "ARAP Fields"  # shape key that carries the motion
 FIELD_MODIFIER = "ARAP Fields"  # modifier that carries the motion, and its node group
 SHAPE_OF = "arapfields_shape_of"  # custom property of the mesh that carries a live motion: what that is of

@@ -3,7 +3,16 @@
 
 import bpy
 
-from ..blender.property_definitions import annotations, choice, collection, colour, flag, integer, pointer
+from ..blender.property_definitions import (
+    annotations,
+    choice,
+    collection,
+    colour,
+    flag,
+    integer,
+    pointer,
+    text,
+)
 from ..blender.selection import select_alone
 from ..core.settings.choices import TRANSFERRED
 from ..core.settings.parameters import WRAP
@@ -79,6 +88,7 @@ class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
         "fit_rig": fit_rig(),
         "move_object": move_object(),
         "transfer": carried_kinds(),
+        "shown_keys": text("Shown Keys", "Values of the shape keys that the wrap was made with, as JSON"),
         **annotations(WRAP),
     }
 

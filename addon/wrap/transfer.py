@@ -15,7 +15,7 @@ from ..core.runtime import native
 from ..core.settings.choices import TRANSFERRED
 from ..handles.empties import matrix_of
 from ..results.placement import single_user
-from . import garments, rigs
+from . import garments, keys, rigs
 from .given import Given
 
 LEAST_WEIGHT = 1e-4  # what is below is no member of a group
@@ -41,24 +41,6 @@ def refusal(source, target):
     return mesh_arrays.nothing_in(target.name, len(target.data.vertices), len(target.data.polygons))
 
 
-def has_keys(source):
-    keys = source.data.shape_keys
-    return keys is not None and len(keys.key_blocks) > 1
-
-
-def refusal_of_keys(source):
-    """Why the keys of a source cannot be carried over, as a UserError; None where they can."""
-    if not source.data.shape_keys.use_relative:
-        return UserError(
-            "The shape keys of {name} are absolute; only relative ones can be transferred", source
-        )
-    if not modifier_stack.keeps_vertices(source):
-        return UserError(
-            "Modifiers of {name} change its vertices; apply them, or leave out Shape Keys", source
-        )
-    return None
-
-
 class Transfer:
     """One source and one target: what is carried goes from the first's wrapped mesh to the second's own."""
 
@@ -79,8 +61,9 @@ class Transfer:
 
     def carry(self, kinds):
         """Carries the kinds over; returns how many of each by label."""
-        if "KEYS" in kinds and has_keys(self.source):
-            refuse(refusal_of_keys(self.source))
+        has_keys = "KEYS" in kinds and keys.of(self.source)
+        if has_keys:
+            refuse(keys.refusal(self.source))
         single_user(self.target)
         steps = {
             "KEYS": self.keys,
@@ -92,47 +75,13 @@ class Transfer:
             "CARRIED": self.carried,
         }
         done = {label: steps[kind]() for kind, label, _ in TRANSFERRED if kind in kinds}
-        if "KEYS" in kinds and has_keys(self.source):
+        if has_keys:
+            keys.take_back(self.source, self.target)
             rigs.copy_drivers(self.source, self.target)
         return done
 
     def keys(self):
-        given = self.source.data.shape_keys
-        if not has_keys(self.source):
-            return 0
-        if self.target.data.shape_keys is None:
-            self.target.shape_key_add(name=given.reference_key.name, from_mix=False)
-        blocks = [block for block in given.key_blocks if block != given.reference_key]
-        places = {
-            block.name: mesh_arrays.vectors(block.data, "co").astype(float) for block in given.key_blocks
-        }
-        offsets = [places[block.name] - places[block.relative_key.name] for block in blocks]
-        carried = self.places.displacements(np.array(offsets))
-        made = {given.reference_key.name: self.target.data.shape_keys.reference_key}
-        for block in blocks:
-            made[block.name] = self.key_named(block.name)
-        shapes = {}
-
-        def shape_of(block):
-            """Keys may be relative to others that are made here too."""
-            if block == given.reference_key:
-                return mesh_arrays.vectors(made[block.name].data, "co").astype(float)
-            if block.name not in shapes:
-                shapes[block.name] = shape_of(block.relative_key) + carried[blocks.index(block)]
-            return shapes[block.name]
-
-        for block in blocks:
-            key = made[block.name]
-            mesh_arrays.put_vectors(key.data, shape_of(block), "co")
-            key.relative_key = made[block.relative_key.name]
-            for name in ("slider_min", "slider_max", "mute", "vertex_group", "interpolation"):
-                setattr(key, name, getattr(block, name))
-        return len(blocks)
-
-    def key_named(self, name):
-        return self.target.data.shape_keys.key_blocks.get(name) or self.target.shape_key_add(
-            name=name, from_mix=False
-        )
+        return keys.carry(self.source, self.target, self.places)
 
     def groups(self):
         done = 0

@@ -10,7 +10,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.wraps import SMALL, bar_and_target, rigged_bar, soup_of
+    from support.blender.wraps import SMALL, rigged_bar, soup_of
 
     import arapfields as af
     from addon.blender import mesh_arrays
@@ -210,20 +210,3 @@ def test_clothes_of_a_wrapped_shape_are_posed_with_it():
     rig.pose.bones["Upper"].rotation_mode, rig.pose.bones["Upper"].rotation_euler.x = "XYZ", 0.8
     assert away() < 2 * before
     assert [m.type for m in worn.modifiers] == ["NODES", "ARMATURE"]
-
-
-def test_keys_that_the_wrap_was_made_with_do_not_move_the_target():
-    """The wrap lays what is seen onto the target, keys included: their values would move it twice."""
-    item, target = bar_and_target()
-    item.shape_key_add(name="Basis")
-    fat = item.shape_key_add(name="Fat")
-    for point in fat.data:
-        point.co.y *= 1.5
-    fat.value = 0.6
-    scenes.activate(item)
-    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
-    shown = scenes.world_points(target)
-    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
-    assert np.array_equal(scenes.world_points(target), shown)
-    target.data.shape_keys.key_blocks["Fat"].value = 1.0
-    assert np.abs(scenes.world_points(target) - shown).max() > 0.1

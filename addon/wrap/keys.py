@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shape keys that a target gets, with their values.
+
+A wrap lays onto the target what is seen, with the values of keys. The same values would move the target a
+second time: one further key takes back those of the wrap. At them the target keeps its shape.
+"""
+
+import json
+
+import numpy as np
+
+from ..blender import mesh_arrays, modifier_stack, vertex_groups
+from ..blender.object_references import settings_of
+from ..core.errors import UserError
+from ..names import NEUTRAL_KEY
+
+
+def of(source):
+    """The keys to hand on, without the basis and what takes back values of its own."""
+    keys = source.data.shape_keys
+    if keys is None:
+        return []
+    return [block for block in keys.key_blocks[1:] if block.name != NEUTRAL_KEY]
+
+
+def refusal(source):
+    """Why the keys of a source cannot be carried over, as a UserError; None where they can."""
+    if not source.data.shape_keys.use_relative:
+        return UserError(
+            "The shape keys of {name} are absolute; only relative ones can be transferred", source
+        )
+    if not modifier_stack.keeps_vertices(source):
+        return UserError(
+            "Modifiers of {name} change its vertices; apply them, or leave out Shape Keys", source
+        )
+    return None
+
+
+def shown(source):
+    """{name: how much of each key is in the shape that is seen}."""
+    blocks, values = of(source), {}
+    if source.show_only_shape_key:
+        block = source.active_shape_key
+        while block in blocks and block.name not in values:
+            values[block.name], block = 1.0, block.relative_key
+        return values
+    return {block.name: block.value for block in blocks if block.value and not block.mute}
+
+
+def carry(source, target, places):
+    """Carries the keys over by where the target lies on the source; returns how many."""
+    blocks = of(source)
+    if not blocks:
+        return 0
+    given, basis = source.data.shape_keys.key_blocks, source.data.shape_keys.reference_key
+    if target.data.shape_keys is None:
+        target.shape_key_add(name=basis.name, from_mix=False)
+    points = {block: points_of(block) for block in given}
+    offsets = np.array([points[block] - points[block.relative_key] for block in blocks])
+    carried = dict(zip(blocks, places.displacements(offsets), strict=True))
+    made = {block: key_named(target, block.name) for block in blocks}
+    made[basis] = target.data.shape_keys.reference_key
+    start_of = {block: block.relative_key if block.relative_key in made else basis for block in blocks}
+    shapes = {basis: points_of(made[basis])}
+
+    def shape_of(block):
+        """Keys may be relative to others that are made here too."""
+        if block not in shapes:
+            shapes[block] = shape_of(start_of[block]) + carried[block]
+        return shapes[block]
+
+    for block in blocks:
+        key = made[block]
+        mesh_arrays.put_vectors(key.data, shape_of(block), "co")
+        key.relative_key = made[start_of[block]]
+        for name in ("slider_min", "slider_max", "value", "mute", "vertex_group", "interpolation"):
+            setattr(key, name, getattr(block, name))
+    return len(blocks)
+
+
+def points_of(block):
+    return mesh_arrays.vectors(block.data, "co").astype(float)
+
+
+def key_named(target, name):
+    return target.data.shape_keys.key_blocks.get(name) or target.shape_key_add(name=name, from_mix=False)
+
+
+def take_back(source, target):
+    """The key that takes back the values of the wrap; call it once the target has its groups."""
+    kept, keys = settings_of(source).wrap.shown_keys, target.data.shape_keys.key_blocks
+    values = json.loads(kept) if kept else shown(source)
+    moved = {keys[block.name]: values[block.name] for block in of(source) if values.get(block.name)}
+    if not moved:
+        if NEUTRAL_KEY in keys:
+            target.shape_key_remove(keys[NEUTRAL_KEY])
+        return
+    masks = {key.vertex_group for key in moved} & set(target.vertex_groups.keys())
+    indices = {name: target.vertex_groups[name].index for name in masks}
+    weights = vertex_groups.weights_in(target.data, indices)
+    shape, everywhere = points_of(keys[0]), np.ones(len(target.data.vertices))
+    for key, value in moved.items():
+        weight = value * weights.get(key.vertex_group, everywhere)
+        shape -= weight[:, None] * (points_of(key) - points_of(key.relative_key))
+    key = key_named(target, NEUTRAL_KEY)
+    mesh_arrays.put_vectors(key.data, shape, "co")
+    key.relative_key, key.value, key.mute = keys[0], 1.0, False

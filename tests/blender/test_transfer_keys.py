@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Values of shape keys that a wrapped object hands on to its target."""
+
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.wraps import SMALL, bar_and_target
+
+    from addon.blender import mesh_arrays
+
+pytestmark = pytest.mark.in_blender
+
+SINGLE = 1e-5  # Blender keeps coordinates in single precision
+
+
+def offsets(item, name):
+    block = item.data.shape_keys.key_blocks[name]
+    places = [mesh_arrays.vectors(key.data, "co").astype(float) for key in (block, block.relative_key)]
+    return places[0] - places[1]
+
+
+def shifted(item, name, by):
+    """A further shape key that shifts every vertex."""
+    block = item.shape_key_add(name=name, from_mix=False)
+    points = mesh_arrays.vectors(block.data, "co")
+    mesh_arrays.put_vectors(block.data, points + np.array(by), "co")
+    return block
+
+
+def test_values_that_the_wrap_was_made_with_do_not_move_the_target():
+    """The wrap lays what is seen onto the target, keys included: a further key takes their values back."""
+    item, target = bar_and_target()
+    item.shape_key_add(name="Basis")
+    fat, unseen = shifted(item, "Fat", (0, 0, 0)), shifted(item, "Unseen", (0, 0, 2))
+    for point in fat.data:
+        point.co.y *= 1.5
+    half, tip = shifted(item, "Half", (0.2, 0, 0)), shifted(item, "Tip", (0, 0.4, 0))
+    half.relative_key = fat
+    tip.vertex_group = item.vertex_groups.new(name="End").name
+    item.vertex_groups["End"].add([v.index for v in item.data.vertices if v.co.x > 0], 0.5, "REPLACE")
+    unseen.value, unseen.mute = 1.0, True
+    half.value, tip.slider_min, tip.value = 0.5, -1.0, -0.3
+    item["smile"] = 0.6
+    driver = fat.driver_add("value").driver
+    variable = driver.variables.new()
+    variable.name, variable.targets[0].id, variable.targets[0].data_path = "smile", item, '["smile"]'
+    driver.expression = "smile"
+    target["smile"] = 0.6
+    bpy.context.view_layer.update()
+    scenes.activate(item)
+    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+    shown, own = scenes.world_points(target), mesh_arrays.positions(target.data)
+    scenes.activate(item)
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    keys = target.data.shape_keys.key_blocks
+    assert [key.name for key in keys] == ["Basis", "Fat", "Unseen", "Half", "Tip", "ARAP Neutral"]
+    assert [round(key.value, 5) for key in keys[1:]] == [0.6, 1.0, 0.5, -0.3, 1.0]
+    assert keys["Unseen"].mute and keys["Half"].relative_key == keys["Fat"]
+    assert np.array_equal(mesh_arrays.positions(target.data), own)
+    assert np.abs(scenes.world_points(target) - shown).max() < SINGLE
+    offset = offsets(target, "Fat") @ np.array(target.matrix_world)[:3, :3].T
+    target["smile"] = 1.0
+    target.update_tag()
+    bpy.context.view_layer.update()
+    assert np.abs(offset).max() > 0.1
+    assert np.abs(scenes.world_points(target) - shown - 0.4 * offset).max() < 2 * SINGLE
+
+    item["smile"], tip.value = 0.2, 0.0  # since the wrap: the target looks as the object does
+    item.update_tag()
+    bpy.context.view_layer.update()
+    target["smile"] = 0.2
+    scenes.activate(item)
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    weights = [
+        [g.weight for g in v.groups if g.group == target.vertex_groups["End"].index]
+        for v in target.data.vertices
+    ]
+    masked = np.array([[sum(each)] for each in weights]) * offsets(target, "Tip")
+    change = (0.3 * masked - 0.4 * offsets(target, "Fat")) @ np.array(target.matrix_world)[:3, :3].T
+    assert len(keys) == 6 and np.abs(masked).max() > 0.1
+    assert np.abs(scenes.world_points(target) - shown - change).max() < 2 * SINGLE
+
+
+def test_undo_and_a_wrap_at_rest_take_the_neutral_key_away():
+    item, target = bar_and_target()
+    item.shape_key_add(name="Basis")
+    shifted(item, "Up", (0, 0, 0.2)).value = 0.5
+    scenes.activate(item)
+    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+    bpy.context.preferences.edit.use_global_undo = True
+    names = item.name, target.name
+    for message in ("Wrap", "Transfer"):
+        bpy.ops.ed.undo_push(message=message)
+        if message == "Wrap":
+            assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    bpy.ops.ed.undo()
+    assert bpy.data.objects[names[1]].data.shape_keys is None
+    bpy.ops.ed.redo()
+    item, target = (bpy.data.objects[name] for name in names)
+    assert "ARAP Neutral" in target.data.shape_keys.key_blocks
+    item.data.shape_keys.key_blocks["Up"].value = 0.0
+    scenes.activate(item)
+    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    assert [(key.name, key.value) for key in target.data.shape_keys.key_blocks[1:]] == [("Up", 0.0)]
