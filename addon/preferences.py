@@ -32,23 +32,27 @@ class ARAPFIELDS_AP_preferences(bpy.types.AddonPreferences):
     }
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        machine = (parameter.name for parameter in MACHINE)
-        draw_settings(layout, self, *machine, "cache_folder", "show_boxes", "show_previews")
-        cache = user_preferences.fit_cache()
-        layout.label(
-            text=translated(
-                "{size} MB of fitted surfaces in {folder}",
-                size=f"{cache.size() / 1e6:.1f}",
-                folder=cache.folder,
-            )
+        show(self.layout, self)
+
+
+def show(layout, group):
+    """`group`: what has the settings."""
+    layout.use_property_split = True
+    machine = (parameter.name for parameter in MACHINE)
+    draw_settings(layout, group, *machine, "cache_folder", "show_boxes", "show_previews")
+    cache = user_preferences.fit_cache()
+    layout.label(
+        text=translated(
+            "{size} MB of fitted surfaces in {folder}",
+            size=f"{cache.size() / 1e6:.1f}",
+            folder=cache.folder,
         )
-        layout.operator(Op.CLEAR_CACHE, icon="TRASH")
-        box = layout.box()
-        for line in native.report():
-            box.label(text=line, icon="ERROR" if line == str(native.problem()) else "NONE")
-        box.operator(Op.COPY_REPORT, icon="COPYDOWN")
+    )
+    layout.operator(Op.CLEAR_CACHE, icon="TRASH")
+    box = layout.box()
+    for line in native.report():
+        box.label(text=line, icon="ERROR" if line == str(native.problem()) else "NONE")
+    box.operator(Op.COPY_REPORT, icon="COPYDOWN")
 
 
 class ARAPFIELDS_OT_copy_report(ReportingOperator, bpy.types.Operator):

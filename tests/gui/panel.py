@@ -4,7 +4,7 @@
 import bpy
 import stage
 
-from addon.preferences import ARAPFIELDS_AP_preferences
+from addon.preferences import ARAPFIELDS_AP_preferences, show
 from addon.registration import CLASSES
 
 PANEL, ADVANCED = "ARAPFIELDS_PT_", "ARAPFIELDS_PT_advanced"
@@ -101,7 +101,9 @@ def preferences(folder, name):
     class Shown(bpy.types.Operator):
         bl_idname, bl_label = "wm.arapfields_preferences_shown", "ARAP Fields"
         __annotations__ = dict(ARAPFIELDS_AP_preferences.__annotations__)
-        draw = ARAPFIELDS_AP_preferences.draw
+
+        def draw(self, context):
+            show(self.layout, self.properties)
 
         def invoke(self, context, event):
             return context.window_manager.invoke_props_dialog(self, width=500)

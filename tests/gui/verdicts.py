@@ -175,7 +175,7 @@ EXPECTED = {  # of each part, every entry that it finds
         "selected": FIGURE.each(3),
         "active": is_("Suzanne"),
         "handles": Rule("holds something", lambda figures: figures[1] > 0).each(2),
-        "row_selects": is_("Empty.001"),
+        "row_selects": is_("Handle 2"),
         "deformed_by": above(0.1),
         "stack": Rule("with the field", lambda figures: "ARAP Fields" in figures),
         "stylized_by": above(0.01),
