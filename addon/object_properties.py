@@ -20,11 +20,13 @@ from .skin.properties import ARAPFIELDS_PG_skin
 from .stiffness.properties import ARAPFIELDS_PG_stiffness
 from .wrap.properties import ARAPFIELDS_PG_wrap
 
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # what library overrides keep: they are carried
+
 
 class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):
-    item: pointer(bpy.types.Object, "Object", "The result object")
-    kind: text("Kind", "DEFORM, STYLIZE or EXTRACT")
-    output: text("Geometry", "WARP, SURFACE or REMESH")
+    item: pointer(bpy.types.Object, "Object", "The result object", override=OVERRIDABLE)
+    kind: text("Kind", "DEFORM, STYLIZE or EXTRACT", override=OVERRIDABLE)
+    output: text("Geometry", "WARP, SURFACE or REMESH", override=OVERRIDABLE)
 
 
 def get_result(settings):
@@ -64,7 +66,9 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     contact: pointer(ARAPFIELDS_PG_contact, "Contact", "What the surface does not pass")
     carried: collection(ARAPFIELDS_PG_carried, "Carried Objects", "Objects that the field moves as well")
     active_carried: integer("Active Carried Object", "Row chosen in the list of carried objects")
-    carried_by: pointer(bpy.types.Object, "Carried By", "The object whose field moves this one")
+    carried_by: pointer(
+        bpy.types.Object, "Carried By", "The object whose field moves this one", override=OVERRIDABLE
+    )
     field_helper: pointer(
         bpy.types.Object, "Field as Nodes", "What has the field's numbers, where nodes evaluate it"
     )
@@ -81,7 +85,12 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     )
     handle_of: pointer(bpy.types.Object, "Handle Of", "The object that this Empty is a handle of")
     made_from: text("Made From", "Name of the object that this result was made from when it was made")
-    results: collection(ARAPFIELDS_PG_result, "Results", "Objects made from this one")
+    results: collection(
+        ARAPFIELDS_PG_result,
+        "Results",
+        "Objects made from this one",
+        override={*OVERRIDABLE, "USE_INSERTION"},
+    )
     output: output()
     surface: surface()
     target: result()  # as files store it
@@ -93,7 +102,7 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     live_number: integer("Live Session", "Number of the session that the object is live by")
     held: text("Held", "Digests of a pose and of the shape that a press without a move holds for it")
     live_hidden: text("Hidden before Live", "Whether the object was hidden in viewport and renders, as JSON")
-    set_aside: flag("Set Aside", "Hidden since what was made of it lies in its place")
+    set_aside: flag("Set Aside", "Hidden since what was made of it lies in its place", override=OVERRIDABLE)
     fit_key: text("Fit", "Name of the object's last fit in the cache")
     fit_options: text("Fit Settings", "Settings of the object's last fit, as JSON")
     fit_report: text("Fit Report", "Figures of the object's last fit, as JSON")
@@ -115,9 +124,8 @@ CLASSES = [ARAPFIELDS_PG_result, ARAPFIELDS_PG_object]
 
 def attach():
     setattr(bpy.types.Bone, BONE_NUMBER, bpy.props.IntProperty(name="ARAP Fields", options={"HIDDEN"}))
-    setattr(
-        bpy.types.Object, PROPERTY, bpy.props.PointerProperty(type=ARAPFIELDS_PG_object, name="ARAP Fields")
-    )
+    ours = bpy.props.PointerProperty(type=ARAPFIELDS_PG_object, name="ARAP Fields", override=OVERRIDABLE)
+    setattr(bpy.types.Object, PROPERTY, ours)
     setattr(
         bpy.types.Scene, PROPERTY, bpy.props.PointerProperty(type=ARAPFIELDS_PG_scene, name="ARAP Fields")
     )

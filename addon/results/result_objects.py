@@ -46,10 +46,8 @@ def existing(context, source, kind, output):
 
 def register(source, kind, output, item):
     entries = settings_of(source).results
-    for index in reversed(range(len(entries))):
-        if entries[index].item is None or (entries[index].kind == kind and entries[index].output == output):
-            entries.remove(index)
-    entry = entries.add()
+    earlier = (entry for entry in entries if entry.kind == kind and entry.output == output)
+    entry = next(earlier, None) or entries.add()
     entry.kind, entry.output, entry.item = kind, output, item
     settings_of(item).made_from = source.name
 

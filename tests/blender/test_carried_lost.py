@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Carried objects of other files, overridden, hidden or lost while live, and what a mask says of them."""
 
+import tempfile
+
 import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
@@ -12,6 +14,7 @@ if IN_BLENDER:
     from support.blender.riders import body, rider, shown
     from support.blender.scenes import delete
 
+    from addon.blender.object_references import owner_of
     from addon.core.runtime import jobs
     from addon.live import sessions
 
@@ -71,6 +74,27 @@ def test_library_overrides_are_carried_or_named(kind):
         assert item.name not in messages and np.abs(shown(item) - before - [0, 0, 0.4]).max() < 0.1
     bpy.ops.arapfields.live()
     assert np.abs(shown(item) - before).max() < CLOSE
+
+
+def test_baked_library_overrides_are_results_like_others():
+    """In objects of their own, twice the same one, also after the file was opened again."""
+    bar, moving = body()
+    linked = scenes.from_another_file(rider("MESH"))[0]
+    item = linked.override_create(remap_local_usages=True)
+    scenes.activate(item, bar)
+    bpy.ops.arapfields.carry(way="FOLLOW")
+    moving.location.z += 0.4
+    for _ in range(2):
+        bar, item = bpy.data.objects["Bar"], next(o for o in bpy.data.objects if o.override_library)
+        scenes.activate(bar)
+        assert bpy.ops.arapfields.bake(format="KEYS", start=1, end=2) == {"FINISHED"}
+        path = f"{tempfile.mkdtemp()}/scene.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        item = next(o for o in bpy.data.objects if o.override_library)
+        baked = [entry.item for entry in item.arapfields.results]
+        assert [owner_of(one) for one in baked] == [item] and item.arapfields.set_aside
+        assert sum(other.name.startswith(baked[0].name) for other in bpy.data.objects) == 1
 
 
 def test_one_that_is_hidden_or_deleted_while_live_is_named_and_nothing_of_the_rest_is_lost():
