@@ -22,12 +22,6 @@ curves and what changes its topology as well. They follow each further solve"""
     bl_options = {"REGISTER", "UNDO"}
     guide = "characters"
 
-    @classmethod
-    def refuses(cls, source):
-        if source.library is not None:
-            return UserError("{name} is linked from another file; make it local to carry objects", source)
-        return None
-
     def change(self, context, source):
         others = [item for item in context.selected_objects if item != source and owner_of(item) != source]
         if not others and helper.of(source) is None:

@@ -108,3 +108,10 @@ def refusal(item, in_edit_mode=False):
     if item.mode == "EDIT" and not in_edit_mode:
         return UserError("{name} is in Edit Mode; leave it first", item)
     return None
+
+
+def refusal_of_linked(item):
+    """Why nothing is kept on an object of another file, as a UserError; None where it is the file's own."""
+    if item.library is not None:
+        return UserError("{name} is linked from another file; make it local first", item)
+    return None

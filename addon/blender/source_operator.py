@@ -4,7 +4,7 @@
 from ..core.errors import UserError
 from .guide import Guided
 from .language import translated
-from .object_references import refusal, source_of
+from .object_references import refusal, refusal_of_linked, source_of
 
 
 class ReportingOperator(Guided):
@@ -36,11 +36,15 @@ class SourceOperator(ReportingOperator):
     """Mixin: needs a source, to which it applies where `refuses` has no reason."""
 
     in_edit_mode = False  # whether it works on a source in Edit Mode too
+    of_linked = False  # whether it works on one that is linked, which stays as it is
 
     @classmethod
     def obstacle(cls, context):
         source = source_of(context)
-        return refusal(source, cls.in_edit_mode) or cls.refuses(source)
+        reason = refusal(source, cls.in_edit_mode)
+        if reason is None and not cls.of_linked:
+            reason = refusal_of_linked(source)
+        return reason or cls.refuses(source)
 
     @classmethod
     def refuses(cls, source):

@@ -21,8 +21,6 @@ class CarriedOperator(SourceOperator):
 
     @classmethod
     def refuses(cls, source):
-        if source.library is not None:
-            return UserError("{name} is linked from another file; make it local to carry objects", source)
         if cls.needs_carried and not settings_of(source).carried:
             return UserError("{name} carries nothing", source)
         return None

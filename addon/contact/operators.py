@@ -16,12 +16,6 @@ class ObstacleOperator(SourceOperator):
     bl_options = {"REGISTER", "UNDO"}
     guide = "motion"
 
-    @classmethod
-    def refuses(cls, source):
-        if source.library is not None:
-            return UserError("{name} is linked from another file; make it local first", source)
-        return None
-
 
 class ARAPFIELDS_OT_add_obstacle(ObstacleOperator, bpy.types.Operator):
     """Add the other selected meshes to what is in the way; without any, a row to choose something in"""

@@ -70,12 +70,6 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
     place: choice(HANDLE_PLACES, "Place", "Where the handle is", options={"SKIP_SAVE"})
     group: text("Vertex Group", "The group to hold, for that kind; empty for the object's active one")
 
-    @classmethod
-    def refuses(cls, source):
-        if source.library is not None:
-            return UserError("{name} is linked from another file; make it local to give it handles", source)
-        return None
-
     def change(self, context, source):
         group = self.group or (source.vertex_groups.active.name if source.vertex_groups else "")
         if self.kind == "GROUP" and not group:
@@ -108,10 +102,6 @@ class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
     counts_points = True
 
     bones: choice(BONES, "Bones", "Which bones become handles")
-
-    @classmethod
-    def refuses(cls, source):
-        return ARAPFIELDS_OT_add_handle.refuses(source)
 
     def change(self, context, source):
         rig = bones.armature_of(context, source)

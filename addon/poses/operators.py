@@ -56,6 +56,7 @@ class ARAPFIELDS_OT_save_pose(OfSource, bpy.types.Operator):
     """Keep the field that deforms the object, with the file, to apply it to other meshes of this shape"""
 
     bl_label = "Save Pose"
+    of_linked = True
 
     pose: text("Name", "Name of the pose", default="Pose")
 

@@ -195,6 +195,7 @@ class ARAPFIELDS_OT_transfer(SourceOperator, bpy.types.Operator):
     bl_label = "Transfer to Target"
     bl_options = {"REGISTER", "UNDO"}
     guide = "wrap"
+    of_linked = True
 
     __annotations__ = {"onto": onto, "transfer": carried_kinds(options=("SKIP_SAVE",))}
 

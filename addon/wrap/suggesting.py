@@ -6,7 +6,7 @@ import numpy as np
 
 from ..blender.language import translated
 from ..blender.native_options import options_of
-from ..blender.object_references import ObjectReference, settings_of
+from ..blender.object_references import ObjectReference, refusal_of_linked, settings_of
 from ..blender.property_definitions import effective_values, integer
 from ..core.geometry.spaces import transform
 from ..core.runtime import native
@@ -29,7 +29,7 @@ class ARAPFIELDS_OT_suggest_landmarks(JobOperator, bpy.types.Operator):
 
     @classmethod
     def refuses(cls, source):
-        return landmarks.refusal(source)
+        return refusal_of_linked(source) or landmarks.refusal(source)
 
     def plan(self, context, source, weights):
         values, af = effective_values(WRAP, settings_of(source).wrap, None), native.library()

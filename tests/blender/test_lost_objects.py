@@ -108,6 +108,35 @@ def reports(operator, **properties):
     return said
 
 
+def test_nothing_is_changed_on_a_linked_object():
+    """Where Blender would show it until the file is opened again."""
+    bar, _, moving = scenes.bar_with_handles()
+    bar.arapfields.wrap.onto = scenes.bar("Scan")
+    scenes.activate(bar)
+    bpy.ops.arapfields.add_landmark(rest=(1, 0, 0), on_target=(1, 0, 0))
+    moving.location.z += 0.4
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    bar.name = "Linked"
+    linked = scenes.from_another_file(bar)[0]
+    scenes.activate(linked)
+    ours = bpy.ops.arapfields
+    for operator in (
+        ours.add_handle,
+        ours.set_rest,
+        ours.remove_handle,
+        ours.add_landmark,
+        ours.mirror_landmarks,
+        ours.remove_landmark,
+        ours.suggest_landmarks,
+        ours.add_obstacle,
+        ours.remove_field,
+        ours.apply_as_shape_key,
+        ours.field_as_nodes,
+    ):
+        with pytest.raises(RuntimeError, match="Linked is linked from another file; make it local first"):
+            operator()
+
+
 def test_a_library_override_is_refused_before_pressing():
     scenes.bar_with_handles("Linked")
     path = tempfile.mktemp(suffix=".blend")
