@@ -38,7 +38,7 @@ def parts(figures):
         yield from one_redraw(figures, kind)
     equal = (threads, "lower_thread_priority", lambda: None)
     silent = (modal.ModalRun, "show_progress", lambda *_: None)
-    unseen = (display.user_preferences, "show_previews", lambda: False)
+    unseen = (display.user_preferences, "shows", lambda name: name != "show_previews")
     for name, changes in (
         ("job_not_shown_same_priority", (equal, silent)),
         ("job_not_shown", (silent,)),
