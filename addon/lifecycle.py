@@ -14,6 +14,7 @@ from .core.runtime import jobs, threads
 from .deform import first_result
 from .field_modifier import copies, motion
 from .handles import held_counts, left_behind, row_selection
+from .jobs import modal
 from .jobs.display import display
 from .live import recovery, rendering, sessions, stored, touching
 from .live.prefetch import prefetch
@@ -132,9 +133,9 @@ PARTS = (  # what begins with the extension, and how it ends
 )
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
-STATE = (jobs.board, display, sessions.live, held_counts.pending, staleness.changed, motion.written)
-STATE += (hover, prefetch, applying.solved, previews.shown, first_result.steps, row_selection.seen, timers)
-STATE += (style_object.cache, left_behind.seen, stored.shapes)
+STATE = (modal.runs, jobs.board, display, sessions.live, held_counts.pending, staleness.changed)
+STATE += (motion.written, hover, prefetch, applying.solved, previews.shown, first_result.steps)
+STATE += (row_selection.seen, timers, style_object.cache, left_behind.seen, stored.shapes)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread
 

@@ -7,6 +7,18 @@ from ..core.runtime.coroutines import step_for
 from .display import display
 
 
+class Runs(set):
+    """Coroutines of the operators in the window."""
+
+    def clear(self):
+        """Ends them while their operators are there: Blender drops these with their class, unasked."""
+        while self:
+            self.pop().close()
+
+
+runs = Runs()
+
+
 class ModalRun:
     """Mixin of operators with a `coroutine(context)` of what the main thread does for a job."""
 
@@ -16,6 +28,7 @@ class ModalRun:
         if not has_window() or context.window is None:
             return self.execute(context)
         self.in_window, self._coroutine = True, self.coroutine(context)
+        runs.add(self._coroutine)
         display.begin(context)
         result = self.advance(context)
         if result == {"RUNNING_MODAL"}:  # what ends at once is freed, with a handler of it left
@@ -57,6 +70,7 @@ class ModalRun:
         self.leave()
 
     def leave(self):
+        runs.discard(self._coroutine)
         self._coroutine.close()
         jobs.stop()
         display.clear()

@@ -2,6 +2,7 @@
 """The modal operator and what it shows, driven by stand-ins for a window's events, timer and status bar."""
 
 import contextlib
+import inspect
 import time
 
 import pytest
@@ -117,6 +118,7 @@ def test_the_status_bar_is_cleared_when_the_extension_is_disabled():
         assert context.texts[-1] and "Bar" in context.texts[-1]
         addon.unregister()
         assert context.texts[-1] is None and not context.timers and jobs.running() is None
+        assert inspect.getgeneratorstate(running._coroutine) == inspect.GEN_CLOSED  # not without its operator
         assert running.modal(context, event("TIMER")) == {"CANCELLED"}
         addon.register()
 
