@@ -37,6 +37,9 @@ class PinOperator(ReportingOperator):
         wrong_mode = None if context.mode == "OBJECT" else UserError("Leave this mode first")
         return native.problem() or wrong_mode
 
+    def change(self, context, source):
+        raise UserError("A 3D view is needed")
+
 
 class Dragging(PinOperator):
     """Mixin of modal operators that drag a handle until the button is released."""

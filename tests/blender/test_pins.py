@@ -196,3 +196,9 @@ def test_a_drag_keys_the_pin_where_automatic_keys_are_on():
     assert keyed.animation_data.action is not None
     bpy.context.scene.frame_set(20)
     assert abs(keyed.location.z - 0.6) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["pin_hover", "pin_drag", "pin_turn", "pin_anchor"])
+def test_what_needs_the_mouse_says_so_to_a_script(name):
+    with pytest.raises(RuntimeError, match="A 3D view is needed"):
+        getattr(bpy.ops.arapfields, name)("EXEC_DEFAULT")
