@@ -11,6 +11,9 @@ namespace {
 
 using namespace wrap_parameters;
 
+/// Differences beyond so many usual ones count for little; the usual one is the second times the median.
+constexpr double curvature_outlier = 2.0, deviation_of_median = 1.48;
+
 /// Weight of a pair by its normals (Rusinkiewicz, Levoy 2001, section 3.4).
 double compatibility(const Vec3& a, const Vec3& b) {
   return std::clamp((a.dot(b) - incompatible_cosine) / (compatible_cosine - incompatible_cosine), 0.0, 1.0);
@@ -26,6 +29,37 @@ void CorrespondenceTerms::add(Index point, const Vec3& displacement, const Vec3&
       (Eigen::RowVectorXd(6) << form(0, 0), form(1, 1), form(2, 2), form(0, 1), form(0, 2), form(1, 2))
           .finished();
   right_hand_sides.row(point) += (form * displacement).transpose();
+}
+
+void CorrespondenceTerms::add_curvature(const WrapTarget& target, const SurfacePoints& surface,
+                                        const std::vector<Index>& target_of, double weight) {
+  const Index n = surface.points.rows();
+  RowMatrix<double> differences(n, 2);
+  for (Index i = 0; i < n; ++i) {
+    const Index k = target_of[i];
+    const Vec3 offset = (surface.points.row(i) - target.points.row(k)).transpose();
+    for (int c = 0; c < 2; ++c)
+      differences(i, c) = surface.curvatures(i, c) - target.curvature.values(k, c) -
+                          target.curvature.gradients.row(k).segment<3>(3 * c).dot(offset);
+  }
+  for (int c = 0; c < 2; ++c) {
+    std::vector<double> sizes(n);
+    for (Index i = 0; i < n; ++i) sizes[i] = std::abs(differences(i, c));
+    std::nth_element(sizes.begin(), sizes.begin() + n / 2, sizes.end());
+    const double usual = deviation_of_median * sizes[n / 2] + 1e-6;
+    for (Index i = 0; i < n; ++i) {
+      const Vec3 gradient =
+          target.curvature.gradients.row(target_of[i]).segment<3>(3 * c).transpose() / usual;
+      const double difference = differences(i, c) / usual;
+      const double robust = 1.0 / (1.0 + std::pow(difference / curvature_outlier, 2));
+      const double w = weight * match_weights[i] * surface.area_weights[i] * robust * robust;
+      const Mat3 form = w * gradient * gradient.transpose();
+      forms.row(i) +=
+          (Eigen::RowVectorXd(6) << form(0, 0), form(1, 1), form(2, 2), form(0, 1), form(0, 2), form(1, 2))
+              .finished();
+      right_hand_sides.row(i) += w * difference * gradient.transpose();
+    }
+  }
 }
 
 CorrespondenceTerms::CorrespondenceTerms(const WrapTarget& target, const SurfacePoints& surface,
@@ -58,6 +92,9 @@ CorrespondenceTerms::CorrespondenceTerms(const WrapTarget& target, const Surface
     add(i, displacement, normal, weights.tangential, weights.weight * weight * surface.area_weights[i]);
   }
   matched_share = 1.0 - unmatched;
+
+  if (weights.curvature > 0.0 && surface.curvatures.rows() == n && target.curvature.values.rows() == m)
+    add_curvature(target, surface, target_of, weights.curvature);
 
   // From the target to the surface.
   for (Index k = 0; k < m && weights.coverage > 0.0; ++k) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <vector>
+
 #include "wrap/target.h"
 
 namespace arapfields {
@@ -11,6 +13,7 @@ struct CorrespondenceWeights {
   double coverage = 1.0;    ///< of distances from the target's samples, beside those from the surface's
   double normals = 0.3;     ///< of differences of unit normals, beside distances in cube units
   double tangential = 0.1;  ///< of tangential distances, beside normal ones
+  double curvature = 0.0;   ///< of squared differences of curvatures, in units of the usual ones
   double unoriented = 0.0;  ///< of distances to nearest points without regard to normals
 };
 
@@ -18,11 +21,12 @@ struct CorrespondenceWeights {
 struct SurfacePoints {
   Points points, normals;  ///< (n,3), the normals of length 1
   Vector area_weights;     ///< (n) share of the surface's area that each point represents; their sum is 1
+  RowMatrix<double> curvatures{};  ///< (n,2) as those of the target; empty where they are not compared
 };
 
 /// weight · (mean squared distance of the surface to its corresponding points + coverage · the same from the
 /// target): for each point a quadratic form in its displacement v, vᵀ Q v − 2 rᵀ v + constant.
-struct CorrespondenceTerms {
+struct ARAPFIELDS_EXPORT_TO_TESTS CorrespondenceTerms {
   RowMatrix<double> forms;     ///< (n,6): xx, yy, zz, xy, xz, yz of each Q
   Points right_hand_sides;     ///< (n,3): each r = Q t, t the displacement onto the corresponding point
   Vector match_weights;        ///< (n) from 0, where a point has no counterpart, to 1
@@ -32,6 +36,8 @@ struct CorrespondenceTerms {
                       const CorrespondenceWeights& weights);
 
  private:
+  void add_curvature(const WrapTarget& target, const SurfacePoints& surface,
+                     const std::vector<Index>& target_of, double weight);
   void add(Index point, const Vec3& displacement, const Vec3& normal, double tangential, double weight);
 };
 

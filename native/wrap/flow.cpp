@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "distance/morton.h"
 #include "fields/radial_evaluator.h"
+#include "mesh/sample_mesh.h"
 #include "sampling/sample_choice.h"
 #include "wrap/parameters.h"
 
@@ -30,6 +31,7 @@ WrapStage stage_at(double t, const WrapOptions& options, const LandmarkPull& pul
                            .coverage = coverage * options.coverage,
                            .normals = options.normal_weight,
                            .tangential = tangential.at(t),
+                           .curvature = curvature_weight * std::pow(t, 4),
                            .unoriented = unoriented_weight * t * t};
   stage.landmarks = pull.weight * std::pow(pull.growth, t);
   stage.rigidity = rigidity.at(t);
@@ -80,7 +82,7 @@ struct WrapFlow::StepSamples {
 };
 
 WrapFlow::WrapFlow(const SurfaceSamples& samples, const WrapTarget& target, PointsIn landmarks,
-                   PointsIn landmark_targets, LandmarkPull pull, std::uint64_t seed)
+                   PointsIn landmark_targets, LandmarkPull pull, std::uint64_t seed, const Progress& progress)
     : target_(target),
       random_(seed),
       landmarks_(landmarks),
@@ -91,6 +93,12 @@ WrapFlow::WrapFlow(const SurfaceSamples& samples, const WrapTarget& target, Poin
   rest_normals_ = rows_of(samples.normals, rows);
   if (samples.weights.size() > 0) weights_ = entries_of(samples.weights, rows);
   if (samples.bend_weights.size() > 0) bend_weights_ = entries_of(samples.bend_weights, rows);
+  if (target_.curvature.values.size() > 0) {
+    const SurfaceSamples all =
+        sample_mesh(samples.mesh->vertices, samples.mesh->triangles, curvature_samples, seed);
+    curvatures_ = curvature_values(samples.frame.to_cube(all.frame.to_mesh(all.points)), all.normals, points_,
+                                   rest_normals_, target_.curvature.radius, progress);
+  }
   jacobians_.setZero(points_.rows(), 9);
   for (int k = 0; k < 3; ++k) jacobians_.col(4 * k).setOnes();
 }
@@ -116,6 +124,9 @@ WrapFlow::StepSamples WrapFlow::draw_samples(Index count) {
   chosen.surface.points = rows_of(points_, rows);
   chosen.surface.normals = rows_of(normals, rows);
   chosen.jacobians = jacobians_(rows, Eigen::all);
+  if (curvatures_.size() > 0)
+    chosen.surface.curvatures =  // as the surface grows, it bends less
+        growth(rows).array().rsqrt().matrix().asDiagonal() * curvatures_(rows, Eigen::all);
   Vector represented = density(rows) * static_cast<double>(count);
   represented = represented.cwiseMin(1.0).cwiseInverse();
   chosen.rest_area_weights = represented / represented.sum();

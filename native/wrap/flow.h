@@ -37,9 +37,10 @@ struct LandmarkPull {
 /// the velocity stand on both surfaces in their current positions.
 class WrapFlow {
  public:
-  /// Landmarks and their targets are (k,3). `target` must outlive the flow.
+  /// Landmarks and their targets are (k,3). `target` must outlive the flow; where it has curvatures, the
+  /// samples have their mesh.
   WrapFlow(const SurfaceSamples& samples, const WrapTarget& target, PointsIn landmarks,
-           PointsIn landmark_targets, LandmarkPull pull, std::uint64_t seed);
+           PointsIn landmark_targets, LandmarkPull pull, std::uint64_t seed, const Progress& progress = {});
 
   void step(const WrapStage& stage, const Progress& progress);
   /// All steps of all stages; `after` is called after each. `tangential`: the schedule's weight of tangential
@@ -66,6 +67,7 @@ class WrapFlow {
   Points rest_normals_, points_;  // of samples, in spatial order at rest
   RowMatrix<double> jacobians_;   // (n,9), row-major
   Vector weights_, bend_weights_;
+  RowMatrix<double> curvatures_;  // at rest
   Points landmarks_, landmark_targets_;
   LandmarkPull pull_;
   std::vector<FieldStep> steps_;

@@ -55,6 +55,11 @@ constexpr double incompatible_cosine = -0.1, compatible_cosine = 0.5;  // tuned
 /// point).
 constexpr double return_spacings = 1.5, return_share = 0.25;  // tuned
 
+/// Weight of squared differences of curvature, in units of the usual one, in the last stage; it grows with t⁴
+/// (Sharp, Lee, Wehe 2002, "ICP Registration Using Invariant Features"). Radius of its fits.
+constexpr double curvature_weight = 0.03;   // tuned
+constexpr double curvature_radius = 0.012;  // tuned
+
 // One step of the flow.
 
 /// Samples that the flow moves, and samples in a step's equations: for each center, at least, at most.
@@ -62,8 +67,8 @@ constexpr Index moved_samples = 9000, samples_a_center = 6, least_samples = 800,
 /// Candidates for each center, from which farthest-point sampling chooses.
 constexpr Index candidates_a_center = 4;
 /// Largest ‖∇v‖ of a motion; below 1 the motion y + v(y) is invertible (Vercauteren et al. 2009, section 2).
+/// Beyond, it is split into so many motions at most, and then shortened.
 constexpr double largest_gradient = 0.6;
-/// Motions that a step with a larger gradient is split into, at most; beyond, the step is shortened.
 constexpr int most_substeps = 4;
 /// Weight of the squared coefficients (ridge regression), which keeps the equations well-conditioned.
 constexpr double ridge = 1e-5;
@@ -74,8 +79,8 @@ constexpr int regularization_retries = 4;
 
 // Samples of both surfaces.
 
-/// Samples of the target for the report and, of these, those that the flow uses.
-constexpr Index target_samples = 12000, flow_target_samples = 6000;
+/// Samples of the target for the report, of these those that the flow uses, and of each for its curvature.
+constexpr Index target_samples = 12000, flow_target_samples = 6000, curvature_samples = 48000;
 /// Samples at which distances and det J, and at which energies, are measured for the report.
 constexpr Index measured_samples = 20000, energy_samples = 4000;
 /// Samples of which a flow tells the stretch.

@@ -76,9 +76,21 @@ WrapTarget WrapTarget::subsample(Index count) const {
   result.points = points.topRows(taken);
   result.normals = normals.topRows(taken);
   result.interior = interior.head(taken);
+  if (curvature.values.size() > 0)
+    result.curvature = {curvature.radius, curvature.values.topRows(taken),
+                        curvature.gradients.topRows(taken)};
   result.spacing = spacing * std::sqrt(static_cast<double>(all) / static_cast<double>(taken));
   result.tree = OrientedPoints(result.points, result.normals);
   return result;
+}
+
+SurfaceCurvature curvature_of(const ImplicitFunction& function, const WrapTarget& target,
+                              const Similarity& placement, std::uint64_t seed, const Progress& progress) {
+  const SurfaceSamples samples = samples_of(function, curvature_samples, seed, progress);
+  const Points points = placement.inverse_of(samples.frame.to_mesh(samples.points)),
+               normals = samples.normals * placement.rotation;
+  return curvature_at(points, normals, target.points, target.normals, curvature_radius * target.diagonal,
+                      progress);
 }
 
 double mean_spacing(PointsIn points) {

@@ -6,6 +6,7 @@
 #include "core/implicit.h"
 #include "core/task.h"
 #include "sampling/oriented_points.h"
+#include "wrap/curvature.h"
 
 namespace arapfields {
 
@@ -28,6 +29,7 @@ struct WrapTarget {
   double spacing = 0.0;   ///< mean distance of neighbouring points
   double diagonal = 0.0;  ///< of the bounding box
   OrientedPoints tree;
+  SurfaceCurvature curvature;  ///< at the points; empty where it is not compared
 
   /// The target in the coordinates that the similarity maps to the target's own.
   WrapTarget transformed_back(const Similarity& placement) const;
@@ -39,6 +41,11 @@ struct WrapTarget {
 /// of other functions the zero set. Throws InvalidInput that names `target` where there is no surface.
 WrapTarget wrap_target(const ImplicitFunction& function, Index count, std::uint64_t seed,
                        const Progress& progress);
+
+/// The curvature of the function's surface at the points of the target that it was sampled to, which
+/// `placement` has transformed back.
+SurfaceCurvature curvature_of(const ImplicitFunction& function, const WrapTarget& target,
+                              const Similarity& placement, std::uint64_t seed, const Progress& progress);
 
 /// Mean distance of neighbours among points spread evenly over a surface.
 double mean_spacing(PointsIn points);

@@ -76,7 +76,9 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
   const Similarity placement =
       wrap_alignment(source.with_landmarks(verdict.kept), mesh_target, options.alignment,
                      options.normal_weight, report.warnings, progress.part(0.15, 0.2));
-  const WrapTarget target = mesh_target.transformed_back(placement);
+  WrapTarget target = mesh_target.transformed_back(placement);
+  if (samples.mesh)
+    target.curvature = curvature_of(function, target, placement, seed, progress.part(0.2, 0.22));
   const Points landmark_targets = placement.inverse_of(source.landmark_targets);
   progress.report(0.2, "aligned");
 
@@ -85,8 +87,8 @@ WrapSolution wrap(const SurfaceSamples& samples, const ImplicitFunction& functio
   WrapFlow flow(samples, flow_target, source.landmarks, landmark_targets,
                 {verdict.kept, landmark_weight.first * options.landmark_weight,
                  landmark_weight.last / landmark_weight.first},
-                seed);
-  flow.run(options, progress.part(0.2, 0.95), [&] {
+                seed, progress.part(0.22, 0.23));
+  flow.run(options, progress.part(0.23, 0.95), [&] {
     ++report.iterations;
     progress.preview([&](PointsIn points) { return field_of(flow.steps(), placement, samples)->at(points); });
   });
