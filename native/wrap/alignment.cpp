@@ -107,7 +107,8 @@ class IterativeClosestPoints {
 
 /// Columns: principal axes, right-handed.
 Mat3 principal_axes(PointsIn points) {
-  const Points arms = points.rowwise() - points.colwise().mean();
+  const Eigen::RowVector3d middle = points.colwise().mean();
+  const Points arms = points.rowwise() - middle;
   Mat3 axes = symmetric_eigen3(Mat3(arms.transpose() * arms)).vectors;
   if (axes.determinant() < 0.0) axes.col(0) *= -1.0;
   return axes;
@@ -182,7 +183,8 @@ std::string landmark_name(Index i) { return "landmarks[" + std::to_string(i) + "
 std::string percent_text(double share) { return number_text(std::round(1000.0 * share) / 10.0) + " %"; }
 
 double gyration(PointsIn points) {
-  return std::sqrt((points.rowwise() - points.colwise().mean()).rowwise().squaredNorm().mean());
+  const Eigen::RowVector3d middle = points.colwise().mean();  // evaluated once, not for each point
+  return std::sqrt((points.rowwise() - middle).rowwise().squaredNorm().mean());
 }
 
 Similarity fitted_similarity(PointsIn from, PointsIn to, const Vector& weights, double scale) {
