@@ -21,14 +21,18 @@ double compatibility(const Vec3& a, const Vec3& b) {
 
 }  // namespace
 
+void CorrespondenceTerms::add_form(Index point, const Mat3& form, const Vec3& right_hand_side) {
+  forms.row(point) +=
+      (Eigen::RowVectorXd(6) << form(0, 0), form(1, 1), form(2, 2), form(0, 1), form(0, 2), form(1, 2))
+          .finished();
+  right_hand_sides.row(point) += right_hand_side.transpose();
+}
+
 void CorrespondenceTerms::add(Index point, const Vec3& displacement, const Vec3& normal, double tangential,
                               double weight) {
   const Mat3 form =
       weight * ((1.0 - tangential) * normal * normal.transpose() + tangential * Mat3::Identity());
-  forms.row(point) +=
-      (Eigen::RowVectorXd(6) << form(0, 0), form(1, 1), form(2, 2), form(0, 1), form(0, 2), form(1, 2))
-          .finished();
-  right_hand_sides.row(point) += (form * displacement).transpose();
+  add_form(point, form, form * displacement);
 }
 
 void CorrespondenceTerms::add_curvature(const WrapTarget& target, const SurfacePoints& surface,
@@ -53,11 +57,7 @@ void CorrespondenceTerms::add_curvature(const WrapTarget& target, const SurfaceP
       const double difference = differences(i, c) / usual;
       const double robust = 1.0 / (1.0 + std::pow(difference / curvature_outlier, 2));
       const double w = weight * match_weights[i] * surface.area_weights[i] * robust * robust;
-      const Mat3 form = w * gradient * gradient.transpose();
-      forms.row(i) +=
-          (Eigen::RowVectorXd(6) << form(0, 0), form(1, 1), form(2, 2), form(0, 1), form(0, 2), form(1, 2))
-              .finished();
-      right_hand_sides.row(i) += w * difference * gradient.transpose();
+      add_form(i, w * gradient * gradient.transpose(), w * difference * gradient);
     }
   }
 }

@@ -38,6 +38,7 @@ struct ARAPFIELDS_EXPORT_TO_TESTS CorrespondenceTerms {
  private:
   void add_curvature(const WrapTarget& target, const SurfacePoints& surface,
                      const std::vector<Index>& target_of, double weight);
+  void add_form(Index point, const Mat3& form, const Vec3& right_hand_side);
   void add(Index point, const Vec3& displacement, const Vec3& normal, double tangential, double weight);
 };
 
