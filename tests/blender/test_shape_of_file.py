@@ -221,8 +221,9 @@ def test_a_step_comes_back_live_however_many_sessions_later():
     assert sessions.is_live(bpy.data.objects["Bar"]) and world.everything() == stored
 
 
-def test_a_release_changes_nothing_that_is_seen():
-    """The hand goes fast, and each move's shape is shown in the same picture."""
+@pytest.mark.parametrize("rests", [False, True])
+def test_a_release_changes_nothing_that_is_seen(rests):
+    """The hand goes fast, or rests until the shape is refined; each move is seen in the same picture."""
     bar = scenes.bar(length=3.0)
     for x, y in ((-3.0, -0.25), (-3.0, 0.25), (0.0, -0.25)):
         pin(bar, (x, y, -0.25), 0.1, anchor=True)
@@ -231,6 +232,8 @@ def test_a_release_changes_nothing_that_is_seen():
     limits, drag.SHAPE_WAIT, live_solver.LATEST = (drag.SHAPE_WAIT, live_solver.LATEST), 30.0, 30.0
     for share in np.linspace(0, 0.9, 10)[1:]:
         dragged.move(bpy.context, start + share * np.array([-1.2, 0.3, 1.6]))
+        if rests and share < 0.85:
+            dragged.session().worker.wait(30.0, refined=True)
     drag.SHAPE_WAIT, live_solver.LATEST = limits
     shown = scenes.world_points(bar)
     dragged.end(bpy.context)
