@@ -10,7 +10,7 @@ import subprocess
 
 import bpy
 import stage
-from mouse import until_idle, until_live_rests
+from mouse import until, until_idle, until_live_rests
 from support.blender import scenes, stages
 
 from addon.core.runtime import jobs
@@ -18,7 +18,7 @@ from addon.live import sessions
 
 WHICH = ("source", "handle", "result")
 STAGES = ("idle", "job", "live", "bake")
-WORK = {"field": "neural", "iterations": 60, "samples": 2000, "batch": 100, "width": 32, "layers": 2}
+WORK = {"field": "neural", "iterations": 600, "samples": 2000, "batch": 100, "width": 32, "layers": 2}
 FRAMES = 8  # of a bake
 LIMIT = 120.0  # seconds until a stage has to end
 WIDTH = 320  # pixels of a cell's picture
@@ -119,9 +119,7 @@ def one(cell, which, action, name):
             drag_on()
             yield 0.2
             yield from until_live_rests(20.0)
-        said = " ".join(text for _, text in jobs.messages())
-        if name in ("job", "bake") and action in stages.ENDS_WORK and not said:
-            said = "ended"
+        said = stages.all_said()
         cell["seen"] = seen(said)
         judge(cell, action, name, "source" if which == "source" else "handle", said)
     if errors:
@@ -169,7 +167,13 @@ def begin(which, name):
             bpy.ops.arapfields.deform("INVOKE_DEFAULT")
         elif name == "bake":
             bpy.ops.arapfields.bake("INVOKE_DEFAULT", start=1, end=FRAMES, format="KEYS")
-    yield 0.4
+    yield from until(is_at_work if name in ("job", "bake") else lambda: True, 5.0)
+
+
+def is_at_work():
+    """Whether the worker has set out; its work may have ended at once."""
+    job = jobs.running()
+    return job is None or 0 < job.fraction < 1
 
 
 def item_of(which):

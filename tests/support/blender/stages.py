@@ -18,6 +18,7 @@ from addon.solver import setup
 
 LIFT = 0.4  # of the moving handle, in the height of the world
 ENDS_WORK = {"undone", "redone", "reloaded"}  # whatever works on the file, as before_undo and before_load say
+CANCELLED = {"job": "Deform cancelled", "bake": "Bake cancelled"}  # as an undo says; it goes with the next step
 
 
 @contextlib.contextmanager
@@ -106,17 +107,21 @@ class Stage:
         if self.name == "live":
             for _ in range(3):
                 sessions.update(bpy.context, wait=WAIT)
-            return " ".join(text for _, text in jobs.messages())
+            return all_said()
         if self.name == "idle":
             return ""
         if jobs.running() is None:  # ended from outside, as the window's operator then sees
             self.coroutine.close()
-            return "ended"
+            return all_said()
         try:
             run_to_completion(self.coroutine, wait=lambda: jobs.running().join(0.05))
         finally:
             jobs.stop()
         return " ".join(self.running.said)
+
+
+def all_said():
+    return " ".join(text for _, text in jobs.messages())
 
 
 def deleted(item):
@@ -215,7 +220,8 @@ def after(action, stage, which, said):
             assert scenes.world_points(item)[:, 2].max() > 0.4, said  # it still follows the handle
         return
     if action in ENDS_WORK:
-        assert said == "ended" and "Bar_baked" not in bpy.data.objects
+        assert said == (CANCELLED[stage] if action == "undone" else ""), said
+        assert "Bar_baked" not in bpy.data.objects
     elif gone:
         assert "was deleted while it was worked on" in said and "Bar_baked" not in bpy.data.objects
     elif stage == "job":
