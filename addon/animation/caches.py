@@ -60,13 +60,10 @@ class ShapeKeys:
 
 
 class CacheFile:
-    """The frames of one object in a point cache, which takes its place when it is committed.
+    """The frames of one object in a point cache, which takes its place when it is committed."""
 
-    `modifier_path` is the same path as a modifier has it.
-    """
-
-    def __init__(self, path, modifier_path, frames, fps):
-        self.path, self.modifier_path, self.frames, self._fps = path, modifier_path, frames, fps
+    def __init__(self, path, frames, fps):
+        self.path, self.frames, self._fps = path, frames, fps
         self._writer = None
 
     def discard_item(self):
@@ -102,11 +99,11 @@ class CacheFile:
 
     def play_on(self, item):
         """Has an object play the cache."""
-        cache_modifier.play(item, self.modifier_path, self.frames.start, self.frames.step)
+        cache_modifier.play(item, shown_path(self.path), self.frames.start, self.frames.step)
 
 
 def cache_path(source, suffix, folder, filepath=""):
-    """(absolute path, the same as the modifier has it) of an object's cache; UserError where none can be."""
+    """The absolute path of an object's cache; UserError where none can be."""
     name = BARRED.sub("_", source.name)
     shown = filepath or f"{folder.rstrip('/') or '/'}/{name}{suffix}"
     if shown.startswith("//") and not bpy.data.filepath:
@@ -118,16 +115,20 @@ def cache_path(source, suffix, folder, filepath=""):
         path.parent.mkdir(exist_ok=True)
     except (FileNotFoundError, FileExistsError, NotADirectoryError):
         raise UserError("{folder}: no such folder", folder=path.parent) from None
+    return path
+
+
+def cache_beside(path, name):
+    """The same as cache_path, of an object that goes along: beside the other's cache, with both names."""
+    return path.with_name(f"{path.stem} {BARRED.sub('_', name)}{path.suffix}")
+
+
+def shown_path(path):
+    """A cache's path as its modifier has it: from where the .blend lies by now."""
     if bpy.data.filepath:
         with contextlib.suppress(ValueError):  # on another drive
-            shown = bpy.path.relpath(str(path)).replace(os.sep, "/")  # as other systems read it, too
-    return path, shown
-
-
-def cache_beside(path, shown, name):
-    """The same as cache_path, of an object that goes along: beside the other's cache, with both names."""
-    file = f"{path.stem} {BARRED.sub('_', name)}{path.suffix}"
-    return path.with_name(file), shown.removesuffix(path.name) + file
+            return bpy.path.relpath(str(path)).replace(os.sep, "/")  # as other systems read it, too
+    return str(path)
 
 
 def plain(frame):

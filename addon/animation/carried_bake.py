@@ -35,7 +35,7 @@ from .frames import playing
 class CarriedBake:
     """Given the shapes of each frame in turn by the worker; placed on the main thread.
 
-    `cache_of(name)` is (path, the same as a modifier has it) of an object's cache; None for shape keys.
+    `cache_of(name)` is the path of an object's cache; None for shape keys.
     `is_shared`: other processes solve other frames, of the source alone.
     """
 
@@ -50,7 +50,7 @@ class CarriedBake:
             if is_shared:
                 carrying.leave(carried, UserError("{name} is not baked in parts; bake it whole", name=name))
             elif cache_of is not None and isinstance(carried.carrier, (MeshCarrier, AttributeCarrier)):
-                self.caches[carried] = CacheFile(*cache_of(name), frames, fps)
+                self.caches[carried] = CacheFile(cache_of(name), frames, fps)
 
     def prepare(self):
         """Opens the caches; on the worker."""

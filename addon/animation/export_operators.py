@@ -76,7 +76,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
 
     def places(self, context):
         suffix = exporters.SUFFIXES[self.format]
-        return {caches.cache_path(source_of(context), suffix, "//", self.filepath)[0]: False}
+        return {caches.cache_path(source_of(context), suffix, "//", self.filepath): False}
 
     def plan_frames(self, context, job):
         if exporters.is_missing(self.format):
@@ -106,8 +106,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         self.folder = Path(tempfile.mkdtemp(prefix=f".{path.stem}-frames-", dir=path.parent))
 
         def make(source, kind, chosen):
-            cache = self.folder / f"{source.session_uid}.pc2"
-            return ObjectBake(context, source, kind, chosen, cache, str(cache))
+            return ObjectBake(context, source, kind, chosen, self.folder / f"{source.session_uid}.pc2")
 
         kinds = [(source, effective_kind(source, self)) for source in unsolved]
         items = yield from self.begin(context, job, kinds, self.values(unsolved[0]), make)

@@ -39,18 +39,18 @@ def kind_of(source, kind):
 class ObjectBake:
     """Made and placed on the main thread; prepared, and given its frames, by the worker.
 
-    `path` is where the cache goes, `modifier_path` the same as a modifier has it; None for shape keys.
+    `path` is where the cache goes; None for shape keys.
     `part`: (i, n) where n processes share the frames.
     """
 
-    def __init__(self, context, source, kind, frames, path=None, modifier_path="", part=None, loop=False):
+    def __init__(self, context, source, kind, frames, path=None, part=None, loop=False):
         settings, fps = settings_of(source), secondary_motion.frame_rate(context.scene)
         self.in_place = placement.in_place(settings.output, settings.result) and path is not None
         self.reader = SourceReader(context, source, kind, self.in_place)
         if not self.in_place and settings.output == "WARP":  # live mode shows the pose at hand, a bake all
             self.reader.moves_by_itself = has_motion_before(source, in_place=False)
         self.frames, self.solver, self.error = frames, None, None
-        beside = None if path is None else functools.partial(cache_beside, path, modifier_path)
+        beside = None if path is None else functools.partial(cache_beside, path)
         self.carried = CarriedBake(self.reader.carrying, frames, beside, fps, is_shared=part is not None)
         self.simulation = (
             Simulation(settings.secondary.start, fps) if secondary_motion.is_used(source) else None
@@ -59,9 +59,9 @@ class ObjectBake:
         if path is None:
             self.store = ShapeKeys()
         elif part is None:
-            self.store = CacheFile(path, modifier_path, frames, fps)
+            self.store = CacheFile(path, frames, fps)
         elif self.simulation is None:
-            self.store = SharedCache(path, modifier_path, frames, fps, part)
+            self.store = SharedCache(path, frames, fps, part)
         else:
             raise UserError("{name}: secondary motion is not baked in parts; bake it whole", source)
 

@@ -30,19 +30,19 @@ class CacheOperator(BakeOperator):
         ),
     }
 
-    def paths(self, source, active, values):
-        """As cache_path() gives them; none for shape keys."""
+    def path(self, source, active, values):
+        """As cache_path() gives it; None for shape keys."""
         suffix = caches.SUFFIXES.get(values["format"])
         if suffix is None:
-            return ()
+            return None
         folder = effective_value("folder", settings_of(active).bake, self)
         return caches.cache_path(source, suffix, folder, self.filepath)
 
     def places(self, context):
         active, found, self.failures = source_of(context), {}, []
         for source in self.sources(context):
-            for path in self.paths(source, active, self.values(active))[:1]:
-                cache = modifier_stack.find_cache(source)
+            path, cache = self.path(source, active, self.values(active)), modifier_stack.find_cache(source)
+            if path is not None:
                 found[path] = cache is not None and Path(bpy.path.abspath(cache.filepath)) == path
         return found
 
@@ -54,8 +54,8 @@ class CacheOperator(BakeOperator):
         values = self.values(active)
 
         def make(source, kind, frames):
-            paths = self.paths(source, active, values)
-            bake = self.bake_of(context, source, kind, frames, paths, values)
+            path = self.path(source, active, values)
+            bake = self.bake_of(context, source, kind, frames, path, values)
             self.warn_of_weight(bake)
             return bake
 
@@ -94,13 +94,13 @@ class ARAPFIELDS_OT_bake(CacheOperator, bpy.types.Operator):
     def kind_of(self, source):
         return effective_kind(source, self)
 
-    def bake_of(self, context, source, kind, frames, paths, values):
+    def bake_of(self, context, source, kind, frames, path, values):
         part = tuple(self.part) if any(self.part) else None
         if part is not None and (values["format"] == "KEYS" or not 1 <= part[0] <= part[1]):
             raise UserError(
                 "Part {i} of {n}: caches alone have parts, from 1 of N to N of N", i=part[0], n=part[1]
             )
-        return ObjectBake(context, source, kind, frames, *paths, part=part, loop=values["loop"])
+        return ObjectBake(context, source, kind, frames, path, part=part, loop=values["loop"])
 
 
 class ARAPFIELDS_OT_wrap_sequence(CacheOperator, bpy.types.Operator):
@@ -131,8 +131,8 @@ class ARAPFIELDS_OT_wrap_sequence(CacheOperator, bpy.types.Operator):
         self.scans = scans_in(collection, context.scene, [source for source, _ in sources], values)
         return frames_of(self.scans)
 
-    def bake_of(self, context, source, kind, frames, paths, values):
-        return WrapBake(context, source, frames, self.scans, *paths)
+    def bake_of(self, context, source, kind, frames, path, values):
+        return WrapBake(context, source, frames, self.scans, path)
 
 
 class ARAPFIELDS_OT_remove_bake(SourceOperator, bpy.types.Operator):

@@ -13,8 +13,8 @@ from .caches import CacheFile
 class SharedCache(CacheFile):
     """`part` is (i, n), the i-th of n, 1 ≤ i ≤ n; `missing`: how many frames others are still to solve."""
 
-    def __init__(self, path, modifier_path, frames, fps, part):
-        super().__init__(path, modifier_path, frames, fps)
+    def __init__(self, path, frames, fps, part):
+        super().__init__(path, frames, fps)
         self.part, self.missing, self._began = part, 0, time.time()
         self._store, self._points, self._places, self._digested = None, 0, [], (None, b"")
 

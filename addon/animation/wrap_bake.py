@@ -108,15 +108,15 @@ class WrapBake(ObjectBake):
 
     What is kept lies beside the cache; of shape keys, in the session's folder."""
 
-    def __init__(self, context, source, frames, scans, *paths):
-        super().__init__(context, source, "WRAP", frames, *paths)
+    def __init__(self, context, source, frames, scans, path=None):
+        super().__init__(context, source, "WRAP", frames, path)
         self.scans, self.simulation = scans, None
         self.reader.carrying.is_shown_posed = True  # caches are put behind the armatures
         self.reader.moves_by_itself = True  # scans take memory: few are read ahead
         self.marks = landmarks.Marks(source)
         self.values = effective_values(WRAP, settings_of(source).wrap)
         self.reports, self.left_out = {}, {}  # by frame; frames by what is wrong with them
-        self.output = paths[0] if paths else Path(bpy.app.tempdir, BARRED.sub("_", source.name))
+        self.output = path or Path(bpy.app.tempdir, BARRED.sub("_", source.name))
 
     def request(self, context):
         try:

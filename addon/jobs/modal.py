@@ -2,6 +2,9 @@
 """A job beside the window's events: a modal operator that a timer wakes."""
 
 from ..blender.host import has_window
+from ..blender.language import translated
+from ..blender.scene_reference import SceneReference
+from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..core.runtime.coroutines import step_for
 from .display import display
@@ -27,13 +30,17 @@ class ModalRun:
     def invoke(self, context, event):
         if not has_window() or context.window is None:
             return self.execute(context)
-        self.in_window, self._coroutine = True, self.coroutine(context)
-        runs.add(self._coroutine)
-        display.begin(context)
+        self.set_out(context)
         result = self.advance(context)
         if result == {"RUNNING_MODAL"}:  # what ends at once is freed, with a handler of it left
             context.window_manager.modal_handler_add(self)
         return result
+
+    def set_out(self, context):
+        self.in_window, self._coroutine = True, self.coroutine(context)
+        self._scene = SceneReference(context)
+        runs.add(self._coroutine)
+        display.begin(context)
 
     def modal(self, context, event):
         job = jobs.running()
@@ -51,7 +58,12 @@ class ModalRun:
         """Does a slice of the main thread's work, and shows how far the job is."""
         display.note_arrival()
         try:
-            finished = step_for(self._coroutine)
+            with self._scene.current(context):
+                finished = step_for(self._coroutine)
+        except UserError as error:  # the scene was deleted
+            self.leave()
+            self.add_message("ERROR", translated(error))
+            return {"CANCELLED"}
         except Exception:
             self.leave()
             raise

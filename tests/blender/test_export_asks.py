@@ -107,7 +107,7 @@ def pressed(cls, **given):
     """What a press on the operator's button returns, where all goes well."""
 
     class Operator(bake_operator.BakeOperator):
-        scope, overwrite, places, paths = "ACTIVE", False, cls.places, getattr(cls, "paths", None)
+        scope, overwrite, places, path = "ACTIVE", False, cls.places, getattr(cls, "path", None)
         properties = types.SimpleNamespace(is_property_set=lambda name: name in given)
 
         def execute(self, context):

@@ -29,6 +29,7 @@ class Window:
         self.window, self.window_manager, self.workspace = object(), self, self
         self.windows, self.data, self.context = [], self, self
         self.workspaces = [self]
+        self.scene, self.view_layer = timers.bpy.context.scene, timers.bpy.context.view_layer
 
     def event_timer_add(self, seconds, window):
         self.timers.append(seconds)

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Jobs whose scene the window leaves meanwhile, or whose file is saved elsewhere: they go on in their own."""
+
+import contextlib
+
+import pytest
+from support.blender.inside import IN_BLENDER
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.baking import saved_animation, stepped
+    from support.blender.stages import Operator
+
+    from addon.animation import played
+    from addon.core.runtime import jobs
+    from addon.deform.operators import ARAPFIELDS_OT_deform
+    from addon.jobs.display import display
+
+pytestmark = pytest.mark.in_blender
+
+FRAMES = 30  # far more than are read ahead
+
+
+def swelling_bar():
+    """A bar that swells by itself while a handle lifts it: each frame is read when its turn comes."""
+    bar, folder = saved_animation()
+    bar.shape_key_add(name="Basis")
+    key = bar.shape_key_add(name="Swell")
+    for point in key.data:
+        point.co = point.co * 1.3
+    for frame, value in ((1, 0.0), (FRAMES, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+    bpy.context.scene.frame_set(1)
+    return bar, folder / "cache/Bar.pc2"
+
+
+def begun(operator):
+    """The operator, which runs as in a window."""
+    operator.show_progress = lambda *_: None
+    operator.set_out(bpy.context)
+    return operator
+
+
+def advanced(operator, until=lambda: False):
+    """Advances it until it ends, or that holds; what `advance` returns at last."""
+    result = {"RUNNING_MODAL"}
+    while result == {"RUNNING_MODAL"} and not until():
+        result = operator.advance(bpy.context)
+        if jobs.running() is not None:
+            jobs.running().join(0.001)
+    return result
+
+
+def bake():
+    return begun(stepped(format="PC2", start=1, end=FRAMES, folder="//cache"))
+
+
+def at_frame(number):
+    return lambda: bpy.context.scene.frame_current >= number
+
+
+@contextlib.contextmanager
+def elsewhere():
+    """The window shows another scene."""
+    window, scene = bpy.context.window, bpy.context.scene
+    window.scene = bpy.data.scenes.new("Other")
+    assert bpy.context.scene != scene
+    try:
+        yield
+    finally:
+        with contextlib.suppress(ReferenceError):  # it was deleted
+            window.scene = scene
+
+
+def test_a_bake_goes_on_in_its_own_scene():
+    _, path = swelling_bar()
+    assert advanced(bake()) == {"FINISHED"}
+    expected = path.read_bytes()
+    bpy.ops.arapfields.remove_bake()
+    running = bake()
+    advanced(running, at_frame(4))
+    with elsewhere():
+        assert advanced(running) == {"FINISHED"}, running.said
+    assert path.read_bytes() == expected
+    assert bpy.context.scene.frame_current == 1
+
+
+def test_a_new_object_comes_into_its_sources_scene():
+    bar, _, moving = scenes.bar_with_handles()
+    moving.location.z += 0.4
+    running = begun(Operator(ARAPFIELDS_OT_deform, **scenes.NEW))
+    assert advanced(running, lambda: jobs.running() and jobs.running().items) == {"RUNNING_MODAL"}, running.said
+    with elsewhere():
+        assert advanced(running) == {"FINISHED"}, running.said
+        assert not bpy.context.scene.objects
+    assert "Bar_deformed" in bpy.context.scene.objects and not bar.visible_get()
+
+
+def test_a_bake_says_that_its_scene_was_deleted():
+    _, path = swelling_bar()
+    running = bake()
+    advanced(running, at_frame(4))
+    scene = bpy.context.scene
+    with elsewhere():
+        bpy.data.scenes.remove(scene)
+        assert advanced(running) == {"CANCELLED"}
+    assert running.said == "Scene was deleted while it was worked on"
+    assert jobs.running() is None and not [*path.parent.iterdir()]
+
+
+def test_a_cache_is_found_from_where_the_file_was_saved_meanwhile():
+    bar, path = swelling_bar()
+    running = bake()
+    advanced(running, at_frame(4))
+    (path.parents[1] / "later").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path.parents[1] / "later/scene.blend"))
+    assert advanced(running) == {"FINISHED"}
+    assert bar.modifiers[0].filepath == "//../cache/Bar.pc2" and played.problem(bar) is None
