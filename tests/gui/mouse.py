@@ -41,16 +41,20 @@ def hover(spot):
     yield 0.3
 
 
-def until(reached, limit=20.0):
-    """Waits until a condition holds, so many seconds at most: the machine may be busy."""
-    begin = time.perf_counter()
+def until(reached, limit=20.0, sign=lambda: None):
+    """Waits until a condition holds, so many seconds at most since `sign()` last changed: the machine may be
+    busy."""
+    begin, seen = time.perf_counter(), sign()
     while not reached() and time.perf_counter() - begin < limit:
         yield 0.02
+        if sign() != seen:
+            begin, seen = time.perf_counter(), sign()
     yield 0.05
 
 
 def until_idle(limit=60.0):
-    yield from until(lambda: jobs.running() is None, limit)
+    """Until no job runs, or one has stood still for so long."""
+    yield from until(lambda: jobs.running() is None, limit, jobs.progress)
 
 
 def until_live_rests(limit=30.0):

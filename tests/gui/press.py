@@ -12,7 +12,7 @@ from support.blender import scenes
 from addon.core.runtime import jobs
 from addon.field_modifier import motion
 
-LIMIT = 60.0  # seconds until a result is given up
+LIMIT = 60.0  # seconds without progress until a result is given up
 ROUNDS = 2
 
 
@@ -74,12 +74,12 @@ def one(rounds, name, folder):
     press(name)
     said = time.perf_counter() - begin
     first = None
-    while jobs.running() is not None and time.perf_counter() - begin < LIMIT:
-        if written and first is None and any(at > written[0] for at in drawn):
-            first = shape(bar)
-            if folder is not None:
-                stage.picture(folder, f"press-{name}-first")
-        yield 0.01
+    yield from until_job(lambda: written and any(at > written[0] for at in drawn))
+    if jobs.running() is not None:
+        first = shape(bar)
+        if folder is not None:
+            stage.picture(folder, f"press-{name}-first")
+    yield from until_idle(LIMIT)
     yield 1.0
     stop()
     motion.write = original
@@ -111,8 +111,13 @@ def seconds_to(drawn, written, begin):
     return round(after[0], 3) if after else None
 
 
+def until_job(reached):
+    """Until the running job has come so far, or has ended."""
+    yield from until(lambda: jobs.running() is None or reached(), LIMIT, jobs.progress)
+
+
 def until_shown(bar, rest):
-    yield from until(lambda: jobs.running() is None or not np.array_equal(shape(bar), rest), LIMIT)
+    yield from until_job(lambda: not np.array_equal(shape(bar), rest))
 
 
 def cancelled(name, folder):
