@@ -12,7 +12,8 @@ class SceneReference:
     """Stands for the context's scene and view layer."""
 
     def __init__(self, context):
-        self.name, self.uid, self.layer = context.scene.name, context.scene.session_uid, context.view_layer.name
+        self.name, self.uid = context.scene.name, context.scene.session_uid
+        self.layer = context.view_layer.name
 
     def current(self, context):
         """A context manager in which they are the context's own; UserError where the scene was deleted."""

@@ -15,7 +15,6 @@ if IN_BLENDER:
     from addon.animation import played
     from addon.core.runtime import jobs
     from addon.deform.operators import ARAPFIELDS_OT_deform
-    from addon.jobs.display import display
 
 pytestmark = pytest.mark.in_blender
 
@@ -91,7 +90,7 @@ def test_a_new_object_comes_into_its_sources_scene():
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.4
     running = begun(Operator(ARAPFIELDS_OT_deform, **scenes.NEW))
-    assert advanced(running, lambda: jobs.running() and jobs.running().items) == {"RUNNING_MODAL"}, running.said
+    assert advanced(running, lambda: jobs.running() and jobs.running().items) == {"RUNNING_MODAL"}
     with elsewhere():
         assert advanced(running) == {"FINISHED"}, running.said
         assert not bpy.context.scene.objects

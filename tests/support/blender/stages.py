@@ -18,7 +18,7 @@ from addon.solver import setup
 
 LIFT = 0.4  # of the moving handle, in the height of the world
 ENDS_WORK = {"undone", "redone", "reloaded"}  # whatever works on the file, as before_undo and before_load say
-CANCELLED = {"job": "Deform cancelled", "bake": "Bake cancelled"}  # as an undo says; it goes with the next step
+CANCELLED = {"job": "Deform cancelled", "bake": "Bake cancelled"}  # as an undo says, until the next step
 
 
 @contextlib.contextmanager
