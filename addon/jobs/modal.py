@@ -58,8 +58,7 @@ class ModalRun:
         """Does a slice of the main thread's work, and shows how far the job is."""
         display.note_arrival()
         try:
-            with self._scene.current(context):
-                finished = step_for(self._coroutine)
+            finished = None if self.waits(context) else step_for(self._coroutine)
         except UserError as error:  # the scene was deleted
             self.leave()
             self.add_message("ERROR", translated(error))
@@ -73,6 +72,15 @@ class ModalRun:
         self.show_progress(context, jobs.running())
         display.note_departure()
         return {"RUNNING_MODAL"}
+
+    def waits(self, context):
+        """Whether the main thread's work has to wait until the window shows the job's own scene again."""
+        job = jobs.running()
+        if job is None or job.cancelled:
+            return False
+        name = self._scene.missed(context)
+        job.waiting = name and translated("Waits until the window shows {name}", name=name)
+        return bool(name)
 
     def show_progress(self, context, job):
         display.show(context, job)

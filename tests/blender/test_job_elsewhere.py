@@ -73,7 +73,16 @@ def elsewhere():
             window.scene = scene
 
 
-def test_a_bake_goes_on_in_its_own_scene():
+def only_waits(operator, name="Scene"):
+    """Whether an operator says that it waits for that, and does nothing."""
+    before = [(scene.frame_current, len(scene.objects)) for scene in bpy.data.scenes]
+    results = [operator.advance(bpy.context) for _ in range(20)]
+    assert jobs.running().message == f"Waits until the window shows {name}"
+    assert [(scene.frame_current, len(scene.objects)) for scene in bpy.data.scenes] == before
+    return all(result == {"RUNNING_MODAL"} for result in results)
+
+
+def test_a_bake_waits_until_its_own_scene_is_shown_again():
     _, path = swelling_bar()
     assert advanced(bake()) == {"FINISHED"}
     expected = path.read_bytes()
@@ -81,8 +90,30 @@ def test_a_bake_goes_on_in_its_own_scene():
     running = bake()
     advanced(running, at_frame(4))
     with elsewhere():
-        assert advanced(running) == {"FINISHED"}, running.said
-    assert path.read_bytes() == expected
+        assert only_waits(running)
+    assert advanced(running) == {"FINISHED"}, running.said
+    assert path.read_bytes() == expected and bpy.context.scene.frame_current == 1
+
+
+def test_another_view_layer_is_waited_for_as_well():
+    _, path = swelling_bar()
+    running = bake()
+    advanced(running, at_frame(4))
+    window, layer = bpy.context.window, bpy.context.view_layer
+    window.view_layer = bpy.context.scene.view_layers.new("Other")
+    assert only_waits(running, layer.name)
+    window.view_layer = layer
+    assert advanced(running) == {"FINISHED"} and path.exists()
+
+
+def test_what_is_cancelled_elsewhere_ends_there():
+    _, path = swelling_bar()
+    running = bake()
+    advanced(running, at_frame(4))
+    with elsewhere():
+        jobs.running().cancel()
+        assert advanced(running) == {"CANCELLED"} and running.said == "Bake cancelled"
+    assert jobs.running() is None and not [*path.parent.iterdir()]
     assert bpy.context.scene.frame_current == 1
 
 
@@ -92,8 +123,9 @@ def test_a_new_object_comes_into_its_sources_scene():
     running = begun(Operator(ARAPFIELDS_OT_deform, **scenes.NEW))
     assert advanced(running, lambda: jobs.running() and jobs.running().items) == {"RUNNING_MODAL"}
     with elsewhere():
-        assert advanced(running) == {"FINISHED"}, running.said
-        assert not bpy.context.scene.objects
+        jobs.running().join()
+        assert only_waits(running)
+    assert advanced(running) == {"FINISHED"}, running.said
     assert "Bar_deformed" in bpy.context.scene.objects and not bar.visible_get()
 
 

@@ -54,6 +54,7 @@ class Job:
         self._outcomes = []
         self._taken = 0
         self._main_thread = None  # (fraction, message) while the main thread works
+        self.waiting = ""  # what the main thread waits for
         self._begin = time.monotonic()
         self._thread = None
 
@@ -108,6 +109,8 @@ class Job:
 
     @property
     def message(self):
+        if self.waiting:
+            return self.waiting
         if self._main_thread is not None:
             return self._main_thread[1]
         with self._lock:
