@@ -111,6 +111,8 @@ class SourceReader:
         settings, space, targets = settings_of(seen), space_of(where(source), source.name), []
         if self.handles:
             current = empties.solve_handles(source, space, where=where)
+            if len(current) != len(self.handles):
+                raise SourceChanged(source.name)
             targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
         carried = self.carrying.poses(space, rendered or depsgraph_of(context))
         return Request(

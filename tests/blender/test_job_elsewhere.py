@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Jobs whose scene the window leaves meanwhile, or whose file is saved elsewhere: they go on in their own."""
+"""Jobs whose scene the window leaves meanwhile, or whose file is saved elsewhere, or that lose a handle."""
 
 import contextlib
 
@@ -149,3 +149,13 @@ def test_a_cache_is_found_from_where_the_file_was_saved_meanwhile():
     bpy.ops.wm.save_as_mainfile(filepath=str(path.parents[1] / "later/scene.blend"))
     assert advanced(running) == {"FINISHED"}
     assert bar.modifiers[0].filepath == "//../cache/Bar.pc2" and played.problem(bar) is None
+
+
+def test_a_bake_says_that_it_lost_a_handle():
+    _, path = swelling_bar()
+    running = bake()
+    advanced(running, at_frame(4))
+    scenes.delete(bpy.data.objects["Moving"])
+    assert advanced(running) == {"CANCELLED"}
+    assert running.said == "Bar: Bar changed while it was worked on; run again"
+    assert not [*path.parent.iterdir()]
