@@ -156,9 +156,9 @@ Raises InvalidInput and Cancelled.)")
             return carried(self, offsets, true);
           },
           "displacements"_a, R"(
-Displacements (n, 3) or (k, n, 3), as of shape keys, turned and stretched by the wrap's Jacobian: (…, m, 3).
-Differences along edges are carried rather than places, so that no triangle folds which does not fold there.
-Source: Sumner and Popović 2004.)");
+Displacements (n, 3) or (k, n, 3), as of shape keys: (…, m, 3), carried by the smoothest map of space that takes
+the source's surface to where it was moved. No triangle folds which does not fold there.
+Source: Duchon 1977; Sumner and Popović 2004.)");
   module.def("transfer", &transfer, "field"_a, "source"_a, "target"_a, "what"_a, py::kw_only(),
              "back"_a = false, "task"_a = py::none(), R"(
 Carries what a mesh has over to the mesh that it was wrapped onto, or back.

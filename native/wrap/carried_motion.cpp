@@ -27,14 +27,14 @@ constexpr int most_rounds = 6;
 }  // namespace
 
 CarriedMotion::CarriedMotion(const TriangleMesh& giving, const TriangleMesh& receiving,
-                             const SurfacePlaces& places, std::vector<Mat3> jacobians,
-                             const Progress& progress)
+                             const SurfacePlaces& places, DisplacementMap map, const Progress& progress)
     : giving_(giving),
       receiving_(receiving),
       places_(places),
       first_(first_at_position(receiving.vertices)),
       giving_first_(first_at_position(giving.vertices)),
-      jacobians_(std::move(jacobians)) {
+      map_(std::move(map)),
+      jacobians_(map_.jacobians()) {
   const Index count = receiving.vertices.rows();
   std::map<std::pair<std::int32_t, std::int32_t>, double> weights;
   Vector areas = Vector::Zero(count);
@@ -136,23 +136,27 @@ Points CarriedMotion::operator()(PointsIn given) const {
   const Index count = anchors_.size();
   const std::vector<Mat3> slopes = gradients(given);
   Points at_place(count, 3);
-  Eigen::MatrixX3d anchored(count, 3);
-  for (Index v = 0; v < count; ++v) {
+  for (Index v = 0; v < count; ++v)
     at_place.row(v) =
         places_.interpolated(giving_.triangles, first_[v], [&](Index g) { return given.row(g); });
-    anchored.row(v) = anchors_[v] * (jacobians_[v] * at_place.row(v).transpose()).transpose();
-  }
+  const Points mapped = map_(at_place);
+  const Eigen::MatrixX3d anchored = anchors_.asDiagonal() * mapped;
   Points differences(static_cast<Index>(edges_.size()), 3);
   for (std::size_t k = 0; k < edges_.size(); ++k) {
     const Edge& edge = edges_[k];
-    Vec3 difference = at_place.row(edge.begin) - at_place.row(edge.end);
-    if (!edge.back.isZero(0.0)) {
+    Vec3 carried;
+    if (edge.back.isZero(0.0)) {
+      const double trust = std::min(map_.trust()[edge.begin], map_.trust()[edge.end]);
+      const Vec3 difference = at_place.row(edge.begin) - at_place.row(edge.end),
+                 whole = mapped.row(edge.begin) - mapped.row(edge.end);
+      carried = trust * whole + (1.0 - trust) * (edge.jacobian * difference);
+    } else {
       const auto slope = [&](std::int32_t v) {
         return places_.interpolated(giving_.triangles, v, [&](Index g) -> const Mat3& { return slopes[g]; });
       };
-      difference = 0.5 * (slope(edge.begin) + slope(edge.end)) * edge.back;
+      carried = edge.jacobian * (0.5 * (slope(edge.begin) + slope(edge.end)) * edge.back);
     }
-    differences.row(k) = (edge.weight * (edge.jacobian * difference)).transpose();
+    differences.row(k) = edge.weight * carried.transpose();
   }
 
   Vector kept = Vector::Ones(count);

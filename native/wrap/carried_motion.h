@@ -6,20 +6,22 @@
 #include <vector>
 
 #include "core/task.h"
+#include "wrap/smooth_map.h"
 #include "wrap/surface_places.h"
 
 namespace arapfields {
 
-/// Displacements u on a mesh whose differences along edges follow those of a giving mesh, turned and
-/// stretched: argmin Σ w ‖u_i − u_j − J (δ_i − δ_j)‖² + Σ a ‖u − J δ‖² / L², with cotangent weights w and
-/// areas a. Carrying differences keeps folds out, which J δ has where J changes within δ. One factor serves
-/// any number of δ. Source: Sumner and Popović 2004, "Deformation Transfer for Triangle Meshes", section 3.
+/// Displacements u on a mesh whose differences along edges follow those that a map M carries over from a
+/// giving mesh: argmin Σ w ‖u_i − u_j − d_ij‖² + Σ a ‖u − M(δ)‖² / L², with cotangent weights w and areas a.
+/// d_ij is M(δ)_i − M(δ)_j where the map fits, J (δ_i − δ_j) where it does not, and by gradients of δ where
+/// the places contradict the edge, which keeps folds out. One factor serves any number of δ. Source: Sumner
+/// and Popović 2004, "Deformation Transfer for Triangle Meshes", section 3.
 class CarriedMotion {
  public:
-  /// `places` of the receiving vertices lie on the giving mesh, each in its own space; `jacobians` (n), at
-  /// the receiving vertices, lead from the second to the first. Throws Cancelled.
+  /// `places` of the receiving vertices lie on the giving mesh, each in its own space; `map`, at the
+  /// receiving vertices, leads from the second to the first. Throws Cancelled.
   CarriedMotion(const TriangleMesh& giving, const TriangleMesh& receiving, const SurfacePlaces& places,
-                std::vector<Mat3> jacobians, const Progress& progress = {});
+                DisplacementMap map, const Progress& progress = {});
 
   /// Displacements (m,3) of the giving vertices: (n,3) of the receiving ones.
   Points operator()(PointsIn given) const;
@@ -43,7 +45,8 @@ class CarriedMotion {
   SurfacePlaces places_;
   std::vector<std::int32_t> first_;  // of each receiving vertex, the first at its position
   std::vector<std::int32_t> giving_first_;
-  std::vector<Mat3> jacobians_;
+  DisplacementMap map_;
+  std::vector<Mat3> jacobians_;  // of the map, smoothed
   std::vector<Edge> edges_;
   std::vector<Eigen::Matrix<double, 3, 2>> slopes_;  // of giving triangles: differences to gradients
   Vector giving_areas_;

@@ -13,7 +13,6 @@
 #include "distance/is_closed.h"
 #include "distance/signed_distance.h"
 #include "distance/welded_vertices.h"
-#include "mesh/sample_mesh.h"
 #include "sampling/oriented_points.h"
 #include "wrap/carried_motion.h"
 
@@ -23,16 +22,6 @@ namespace {
 /// Shares of the diagonal of the mesh's bounding box: the distance that a turn by one radian counts as, and
 /// how far a place that faces the right way may lie. Wraps come much nearer; normals of scans may be wrong.
 constexpr double turn_share = 0.1, thin_share = 0.01;
-
-// Affine fits about vertices. Tuned: on keys of shapes with a known map, by the map itself and by wraps.
-
-/// Points on the surface; the radius of their weights exp(−d²/r²), a share of the diagonal; where these end.
-constexpr Index fit_points = 4000;
-constexpr double fit_radius = 0.04, fit_end = 2.2;
-/// Weight of the triangles' J, in squares of the radius: it counts where points lie in a plane.
-constexpr double fit_ridge = 0.0005;
-/// Deviation from the triangles' J, as a share of a point's way, at which it counts a quarter: lips part.
-constexpr double fit_trust = 0.5;
 
 /// Edges of a triangle from its first corner, and its normal times twice its area.
 struct TriangleEdges {
@@ -93,48 +82,14 @@ class Surroundings {
   std::vector<std::vector<std::int32_t>> about_;
 };
 
-/// Replaces Jacobians of the vertices by those of affine fits of the surface about each.
-void fit_surroundings(const TriangleMesh& rest, PointsIn moved, std::vector<Mat3>& jacobians) {
-  const AreaSampler sampler(rest.vertices, rest.triangles);
-  Random random(0);
-  Points before(fit_points, 3), after(fit_points, 3);
-  for (Index i = 0; i < fit_points; ++i) {
-    const AreaSampler::Draw draw = sampler.draw(random);
-    before.row(i) = draw.point;
-    after.row(i).setZero();
-    for (int k = 0; k < 3; ++k) after.row(i) += draw.corners[k] * moved.row(rest.triangles(draw.triangle, k));
-  }
-  const double diagonal = diagonal_of(rest.vertices);
-  const double square = std::pow(fit_radius * diagonal, 2);
-  parallel_for(0, rest.vertices.rows(), 64, [&](Index begin, Index end) {
-    for (Index v = begin; v < end; ++v) {
-      const Eigen::RowVector3d here = rest.vertices.row(v), there = moved.row(v);
-      const double trust = fit_trust * fit_trust * jacobians[v].squaredNorm() / 3.0;
-      double sum = 0.0;
-      Vec3 way = Vec3::Zero(), gone = Vec3::Zero();
-      Mat3 ways = Mat3::Zero(), both = Mat3::Zero();
-      for (Index i = 0; i < fit_points; ++i) {
-        const Vec3 x = (before.row(i) - here).transpose();
-        const double distance = x.squaredNorm();
-        if (distance > fit_end * fit_end * square) continue;
-        const Vec3 y = (after.row(i) - there).transpose();
-        const double off = (y - jacobians[v] * x).squaredNorm() / (trust * distance + 1e-300);
-        const double weight = std::exp(-distance / square) / ((1.0 + off) * (1.0 + off));
-        sum += weight;
-        way += weight * x;
-        gone += weight * y;
-        ways += weight * x * x.transpose();
-        both += weight * y * x.transpose();
-      }
-      if (!(sum > 0.0)) continue;
-      const double ridge = fit_ridge * square;
-      ways += ridge * sum * Mat3::Identity() - way * way.transpose() / sum;
-      both += ridge * sum * jacobians[v] - gone * way.transpose() / sum;
-      const Mat3 fitted = both * ways.inverse();
-      if (fitted.allFinite() && fitted.determinant() * jacobians[v].determinant() > 0.0)
-        jacobians[v] = fitted;
-    }
+RowMatrix<double> values_at(const SurfacePlaces& places, const Triangles& triangles,
+                            const Eigen::Ref<const RowMatrix<double>>& given) {
+  RowMatrix<double> result(places.shares.rows(), given.cols());
+  parallel_for(0, result.rows(), 4096, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i)
+      result.row(i) = places.interpolated(triangles, i, [&](Index v) { return given.row(v); });
   });
+  return result;
 }
 
 Points moved_by(const DeformationField& field, const TriangleMesh& mesh) {
@@ -219,11 +174,15 @@ WrappedMesh::WrappedMesh(const TriangleMesh& source, PointsIn positions)
     else if (first[v] == static_cast<std::int32_t>(v))
       jacobians[v].setIdentity();
   for (std::size_t v = 0; v < areas.size(); ++v) jacobians[v] = jacobians[first[v]];
-  fit_surroundings(source, positions, jacobians);
 }
 
-/// Prepared by the first call that needs it.
+/// How displacements are carried, prepared by the first call that needs it. Points and their images are those
+/// of the receiving vertices, at rest and moved; the Jacobians lead from the first to the second.
 struct Correspondence::Motion {
+  std::optional<WrappedMesh> source;
+  bool back = false;
+  Points points, images;
+  std::vector<Mat3> jacobians;
   std::mutex mutex;
   std::optional<CarriedMotion> carried;
 };
@@ -238,30 +197,30 @@ Correspondence::Correspondence(const WrappedMesh& source, const TriangleMesh& ta
   const TriangleMesh &on = forward ? source.moved : target, &points = forward ? target : source.moved;
   const WeldedVertices welded(points);
   places_ = places_on(on, points.vertices, welded.normals(welded.first, Eigen::all), progress);
-  jacobians_ = source.jacobians;
+  Motion& motion = *motion_;
+  motion.source = source;
+  motion.back = !forward;
+  motion.points = source.rest.vertices;
+  motion.images = source.moved.vertices;
+  motion.jacobians = source.jacobians;
   if (forward) {
-    jacobians_.resize(points.vertices.rows());
+    motion.points = values_at(places_, giving_.triangles, source.rest.vertices);
+    motion.images = values_at(places_, giving_.triangles, source.moved.vertices);
+    motion.jacobians.resize(points.vertices.rows());
     for (Index i = 0; i < points.vertices.rows(); ++i)
-      jacobians_[i] = places_.interpolated(giving_.triangles, i,
-                                           [&](Index v) -> const Mat3& { return source.jacobians[v]; });
+      motion.jacobians[i] = places_.interpolated(giving_.triangles, i,
+                                                 [&](Index v) -> const Mat3& { return source.jacobians[v]; });
     return;
   }
-  for (Mat3& jacobian : jacobians_) {
+  for (const Mat3& jacobian : motion.jacobians)
     require(jacobian.determinant() != 0.0, "field", "the wrap flattens a vertex of the source",
             "each must keep a volume about it for the way back");
-    jacobian = jacobian.inverse().eval();
-  }
 }
 
 RowMatrix<double> Correspondence::values(const RowMatrix<double>& given) const {
   require(given.rows() == giving(), "values", std::to_string(given.rows()) + " rows",
           "one for each of " + std::to_string(giving()) + " vertices is needed");
-  RowMatrix<double> result(places_.shares.rows(), given.cols());
-  parallel_for(0, result.rows(), 4096, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i)
-      result.row(i) = places_.interpolated(giving_.triangles, i, [&](Index v) { return given.row(v); });
-  });
-  return result;
+  return values_at(places_, giving_.triangles, given);
 }
 
 Points Correspondence::displacements(PointsIn given) const {
@@ -269,7 +228,11 @@ Points Correspondence::displacements(PointsIn given) const {
           "one for each of " + std::to_string(giving()) + " vertices is needed");
   {
     const std::lock_guard lock(motion_->mutex);
-    if (!motion_->carried) motion_->carried.emplace(giving_, receiving_, places_, jacobians_);
+    Motion& motion = *motion_;
+    if (!motion.carried)
+      motion.carried.emplace(giving_, receiving_, places_,
+                             DisplacementMap(SmoothMap(motion.source->rest, motion.source->moved.vertices),
+                                             motion.points, motion.images, motion.jacobians, motion.back));
   }
   return (*motion_->carried)(given);
 }

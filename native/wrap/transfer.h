@@ -18,8 +18,7 @@ struct ARAPFIELDS_EXPORT WrappedMesh {
   /// Throws InvalidInput as validate() does.
   WrappedMesh(const TriangleMesh& source, const DeformationField& field);
   /// The Jacobians are those of the triangles; across the surface the scale is the square root of the area's.
-  /// Source: Sumner and Popović 2004, "Deformation Transfer for Triangle Meshes", section 3. An affine fit of
-  /// the surface about each vertex then says more: its curves and its other side tell how it grows across.
+  /// Source: Sumner and Popović 2004, "Deformation Transfer for Triangle Meshes", section 3.
   WrappedMesh(const TriangleMesh& source, PointsIn moved);
 
   TriangleMesh rest;
@@ -41,8 +40,8 @@ class ARAPFIELDS_EXPORT Correspondence {
   Index giving() const { return giving_.vertices.rows(); }
   /// Values (n,k) of the giving vertices, interpolated linearly: (m,k) of the receiving ones.
   RowMatrix<double> values(const RowMatrix<double>& given) const;
-  /// Displacements (n,3), as of a shape key, turned and stretched by the wrap's J, or J⁻¹ on the way back, as
-  /// CarriedMotion says. The first call prepares the others; any thread may call.
+  /// Displacements (n,3), as of a shape key, carried as SmoothMap and CarriedMotion say. The first call
+  /// prepares the others; any thread may call.
   Points displacements(PointsIn given) const;
 
  private:
@@ -50,7 +49,6 @@ class ARAPFIELDS_EXPORT Correspondence {
 
   TriangleMesh giving_;  // each in its own space
   TriangleMesh receiving_;
-  std::vector<Mat3> jacobians_;  // at the receiving vertices, in the direction of the transfer
   SurfacePlaces places_;
   std::shared_ptr<Motion> motion_;
 };

@@ -14,6 +14,8 @@ INTERPOLATION = 0.03
 KEPT = 0.08
 # The same of the worst vertex; what triangles tell of the growth across them is .3 off.
 ACROSS = 0.05
+# The same where a map bends or swells: what a surface tells of space beside it.
+KNOWN_MAP = 0.1
 TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
 
 
@@ -75,6 +77,23 @@ def test_how_a_shape_grows_across_its_surface_is_told_by_its_curves(figure, axis
         found = af.transfer(v * grown, (v, f), (fine * grown, faces), {"displacements": given})
         away = np.linalg.norm(found["displacements"] - told * grown, axis=1)
         assert away.max() < ACROSS * np.linalg.norm(told * grown, axis=1).max()
+
+
+def swollen(points):
+    near = np.exp(-((points - [0.5, 0.3, 0.2]) ** 2).sum(axis=1) / 0.5)
+    return points * (1 + 0.25 * near)[:, None]
+
+
+@pytest.mark.parametrize("known", [cases.bend, swollen])
+def test_keys_are_as_if_the_map_had_moved_their_shapes(figure, known):
+    """Beyond J, too: these keys move by a twentieth of the size, over which J changes."""
+    v, f = figure
+    fine, faces = cases.figure(5)
+    for center in v[[0, len(v) // 5, len(v) // 3, len(v) // 2]]:
+        told = known(fine + key_at(fine, center)) - known(fine)
+        found = af.transfer(known(v), (v, f), (known(fine), faces), {"displacements": key_at(v, center)})
+        away = np.linalg.norm(found["displacements"] - told, axis=1)
+        assert away.max() < KNOWN_MAP * np.linalg.norm(told, axis=1).max()
 
 
 def folded(v, f, motion):

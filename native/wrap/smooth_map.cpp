@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "wrap/smooth_map.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/parallel.h"
+#include "core/random.h"
+#include "fields/radial_basis.h"
+#include "mesh/sample_mesh.h"
+#include "sampling/sample_choice.h"
+#include "tensors/dense.h"
+
+namespace arapfields {
+namespace {
+
+// Tuned: on keys of shapes with a known map, by the map itself and by wraps. Lengths are shares of the
+// diagonal.
+
+/// Points on the surface, of which so many are chosen far from each other.
+constexpr Index candidates = 4000, chosen = 1000;
+/// How little a point weighs.
+constexpr double smoothing = 5e-3;
+/// Points beside the surface, where space grows across as the area's square root: they tell what a plane does
+/// not. How far they lie, and how little they weigh.
+constexpr Index beside = 250;
+constexpr double offset = 0.03, offset_smoothing = 1.0;
+
+/// Distance from a point's image at which the map counts a quarter.
+constexpr double missed_share = 0.03;
+/// What is beyond J δ, as a share of it, at most.
+constexpr double most_beyond = 0.5;
+/// Steps of the fixed point on the way back.
+constexpr int back_steps = 4;
+
+Vec3 normal_of(PointsIn vertices, TrianglesIn triangles, Index t) {
+  const auto corner = [&](int k) -> Vec3 { return vertices.row(triangles(t, k)); };
+  return (corner(1) - corner(0)).cross(corner(2) - corner(0));
+}
+
+}  // namespace
+
+SmoothMap::SmoothMap(const TriangleMesh& from, PointsIn to, const Progress& progress) {
+  const AreaSampler sampler(from.vertices, from.triangles);
+  Random random(0);
+  Points before(candidates, 3), after(candidates, 3), normals(candidates, 3), moved_normals(candidates, 3);
+  for (Index i = 0; i < candidates; ++i) {
+    const AreaSampler::Draw draw = sampler.draw(random);
+    before.row(i) = draw.point;
+    after.row(i).setZero();
+    for (int k = 0; k < 3; ++k) after.row(i) += draw.corners[k] * to.row(from.triangles(draw.triangle, k));
+    const Vec3 normal = normal_of(from.vertices, from.triangles, draw.triangle),
+               moved = normal_of(to, from.triangles, draw.triangle);
+    normals.row(i) = normal.normalized();
+    moved_normals.row(i) = moved / std::sqrt(std::max(moved.norm() * normal.norm(), 1e-300));
+  }
+  center_ = before.colwise().mean();
+  size_ = std::max(diagonal_of(before), 1e-300);
+  const std::vector<Index> rows = farthest_points(before, chosen).indices;
+  const auto count = static_cast<Index>(rows.size()), sides = std::min(beside, count), all = count + sides;
+  Points values(all, 3);
+  Vector least = Vector::Constant(all, smoothing);
+  Points centers(all, 3);
+  centers.topRows(count) = rows_of(before, rows);
+  values.topRows(count) = rows_of(after, rows);
+  for (Index i = 0; i < sides; ++i) {
+    const double way = (i % 2 == 0 ? offset : -offset) * size_;
+    centers.row(count + i) = before.row(rows[i]) + way * normals.row(rows[i]);
+    values.row(count + i) = after.row(rows[i]) + way * moved_normals.row(rows[i]);
+    least[count + i] = offset_smoothing;
+  }
+  centers = in_units(centers);
+  centers_ = centers.array();
+
+  // (K + S) w + P a = y with Pᵀ w = 0: definite where w = Q₂ z for the columns Q₂ that P leaves out.
+  RowMatrix<double> matrix(all, all);
+  parallel_for(0, all, 16, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i)
+      matrix.row(i) =
+          (centers.rowwise() - centers.row(i)).rowwise().norm().array().cube().matrix().transpose();
+  });
+  matrix.diagonal() += least;
+  progress.check();
+  Eigen::Matrix<double, Eigen::Dynamic, 4> plane(all, 4);
+  plane << Vector::Ones(all), centers;
+  const Eigen::HouseholderQR<Eigen::Matrix<double, Eigen::Dynamic, 4>> turn(plane);
+  const auto q = turn.householderQ();
+  RowMatrix<double> turned = q.adjoint() * matrix;
+  turned = (q.adjoint() * turned.transpose()).eval();
+  const RowMatrix<double> right = q.adjoint() * values;
+  progress.check();
+  const RowMatrix<double> factor = cholesky<double>(turned.bottomRightCorner(all - 4, all - 4));
+  RowMatrix<double> inner = RowMatrix<double>::Zero(all, 3);
+  inner.bottomRows(all - 4) = cholesky_solve<double>(factor, right.bottomRows(all - 4));
+  const RowMatrix<double> missed =
+      right.topRows(4) - turned.topRightCorner(4, all - 4) * inner.bottomRows(all - 4);
+  affine_ = turn.matrixQR().topRows<4>().triangularView<Eigen::Upper>().solve(missed);
+  weights_ = (q * inner).array();
+  progress.check();
+}
+
+template <class Visit>
+void SmoothMap::visit(PointsIn points, Visit&& visit) const {
+  const Points x = in_units(points);
+  parallel_for(0, x.rows(), 64, [&](Index begin, Index end) {
+    Columns ways(centers_.rows(), 3);
+    Eigen::ArrayXd distances(centers_.rows());
+    for (Index i = begin; i < end; ++i) {
+      ways = -(centers_.rowwise() - x.row(i).array());
+      distances = ways.square().rowwise().sum().sqrt();
+      visit(i, x.row(i), ways, distances);
+    }
+  });
+}
+
+Points SmoothMap::at(PointsIn points) const {
+  Points result(points.rows(), 3);
+  visit(points, [&](Index i, const auto& x, const auto& /*ways*/, const auto& distances) {
+    result.row(i) = affine_.row(0) + x * affine_.bottomRows<3>() +
+                    distances.cube().matrix().transpose() * weights_.matrix();
+  });
+  return result;
+}
+
+std::vector<Mat3> SmoothMap::jacobians(PointsIn points) const {
+  std::vector<Mat3> result(points.rows());
+  visit(points, [&](Index i, const auto& /*x*/, const auto& ways, const auto& distances) {
+    const Columns slopes = ways.colwise() * (3.0 * distances);
+    result[i] =
+        (affine_.bottomRows<3>().transpose() + weights_.matrix().transpose() * slopes.matrix()) / size_;
+  });
+  return result;
+}
+
+DisplacementMap::DisplacementMap(SmoothMap map, PointsIn points, PointsIn images, std::vector<Mat3> jacobians,
+                                 bool back)
+    : map_(std::move(map)),
+      points_(points),
+      at_points_(map_.at(points)),
+      jacobians_(std::move(jacobians)),
+      map_jacobians_(map_.jacobians(points)),
+      trust_(points.rows()),
+      back_(back) {
+  const double far = missed_share * std::max(diagonal_of(images), 1e-300);
+  for (Index i = 0; i < trust_.size(); ++i) {
+    const double missed = (at_points_.row(i) - images.row(i)).squaredNorm() / (far * far);
+    trust_[i] = map_jacobians_[i].determinant() * jacobians_[i].determinant() > 0.0
+                    ? std::pow(1.0 + missed, -2.0)
+                    : 0.0;
+    jacobians_[i] += trust_[i] * (map_jacobians_[i] - jacobians_[i]);
+  }
+}
+
+std::vector<Mat3> DisplacementMap::jacobians() const {
+  if (!back_) return jacobians_;
+  std::vector<Mat3> result;
+  for (const Mat3& jacobian : jacobians_) result.push_back(jacobian.inverse());
+  return result;
+}
+
+/// Of some points, with a displacement each.
+Points DisplacementMap::beyond_linear(const std::vector<Index>& rows, PointsIn displacements) const {
+  const Points there = map_.at(rows_of(points_, rows) + displacements);
+  Points result(displacements.rows(), 3);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const Index i = rows[k];
+    const Vec3 linear = map_jacobians_[i] * displacements.row(k).transpose(),
+               beyond = (there.row(k) - at_points_.row(i)).transpose() - linear;
+    const double most = most_beyond * linear.norm() / std::max(beyond.norm(), 1e-300);
+    result.row(k) = trust_[i] * std::min(1.0, most) * beyond.transpose();
+  }
+  return result;
+}
+
+Points DisplacementMap::operator()(PointsIn displacements) const {
+  std::vector<Index> rows;
+  for (Index i = 0; i < displacements.rows(); ++i)
+    if (!displacements.row(i).isZero(0.0)) rows.push_back(i);
+  const std::vector<Mat3> slopes = jacobians();
+  const auto linear = [&](const Points& given) {
+    Points result(given.rows(), 3);
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      result.row(k) = (slopes[rows[k]] * given.row(k).transpose()).transpose();
+    return result;
+  };
+  const Points given = rows_of(displacements, rows);
+  Points moved = linear(given);
+  if (!back_) moved += beyond_linear(rows, given);
+  for (int k = 0; back_ && k < back_steps; ++k) moved = linear(given - beyond_linear(rows, moved));
+  Points result = Points::Zero(displacements.rows(), 3);
+  for (std::size_t k = 0; k < rows.size(); ++k) result.row(rows[k]) = moved.row(k);
+  return result;
+}
+
+}  // namespace arapfields

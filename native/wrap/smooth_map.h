@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The smoothest map of space that takes one surface to another.
+#pragma once
+
+#include <vector>
+
+#include "core/task.h"
+#include "mesh/triangle_mesh.h"
+
+namespace arapfields {
+
+/// f(x) = A x + b + Σ w_i |x − c_i|³, which minimises Σ |f(c_i) − y_i|² / s_i + |∇³f|², the last over all of
+/// space. A surface's curves and its other side tell how space grows across it; what is noise, it leaves out.
+/// Source: Duchon 1977, "Splines Minimizing Rotation-Invariant Semi-Norms in Sobolev Spaces"; Wahba 1990,
+/// "Spline Models for Observational Data", section 2.4.
+class ARAPFIELDS_EXPORT_TO_TESTS SmoothMap {
+ public:
+  /// From the vertices of a mesh, which lie at `from`, to the places `to` (n,3). Throws Cancelled.
+  SmoothMap(const TriangleMesh& from, PointsIn to, const Progress& progress = {});
+
+  Points at(PointsIn points) const;
+  std::vector<Mat3> jacobians(PointsIn points) const;
+
+ private:
+  using Columns = Eigen::Array<double, Eigen::Dynamic, 3>;
+  /// Calls visit(row, x, ways, distances) for each point: in units, and from the centers.
+  template <class Visit>
+  void visit(PointsIn points, Visit&& visit) const;
+  Points in_units(PointsIn points) const { return (points.rowwise() - center_) / size_; }
+
+  Eigen::RowVector3d center_;
+  double size_ = 1.0;
+  Columns centers_;
+  Columns weights_;
+  Eigen::Matrix<double, 4, 3> affine_;  // of 1, x, y, z
+};
+
+/// How a smooth map carries displacements δ of points x (n,3), or back those of their images. Where it misses
+/// a point's own image, as where lips part, the Jacobians that are given count instead.
+class ARAPFIELDS_EXPORT_TO_TESTS DisplacementMap {
+ public:
+  DisplacementMap(SmoothMap map, PointsIn points, PointsIn images, std::vector<Mat3> jacobians,
+                  bool back = false);
+
+  /// In the direction of the displacements.
+  std::vector<Mat3> jacobians() const;
+  /// From 0 to 1 (n): how much the map counts.
+  const Vector& trust() const { return trust_; }
+  /// J δ, and what f(x + δ) − f(x) has beyond that; of far displacements a part. Back: the δ of which that
+  /// is.
+  Points operator()(PointsIn displacements) const;
+
+ private:
+  Points beyond_linear(const std::vector<Index>& rows, PointsIn displacements) const;
+
+  SmoothMap map_;
+  Points points_;
+  Points at_points_;
+  std::vector<Mat3> jacobians_;
+  std::vector<Mat3> map_jacobians_;  // without those that are given
+  Vector trust_;
+  bool back_ = false;
+};
+
+}  // namespace arapfields
