@@ -40,7 +40,7 @@ constexpr double near_anyway = 0.03;
 /// It returns if a wrap that pulls firmly brings it within as many medians, or so near, and the stretch grows
 /// by no more than this, or all of the surface comes this much nearer to the target; where it is farther away
 /// without, it is not tried (tuned).
-constexpr double firmly_near = 0.045, more_stretch = 1.1, least_stretch = 0.015, may_return = 0.35;
+constexpr double firmly_near = 0.045, more_stretch = 1.1, least_stretch = 0.02, may_return = 0.35;
 constexpr double much_nearer = 0.8;
 /// Rounds of a wrap, and the factor by which a mirror image must fit better.
 constexpr int rounds = 4;

@@ -13,16 +13,22 @@ SETTINGS = dict(iterations=80, width=96, layers=3, batch=200, threads=1, device=
 
 @pytest.mark.parametrize("extra", [{}, dict(exact_handles=True)], ids=str)
 def test_a_solve_with_rounded_products_is_as_good(extra):
+    """On average: after so few iterations one start ends higher, another lower, by a tenth or more."""
     samples, handles = cases.bar_samples(600), cases.bar_handles(40.0)
-    exact, rounded, again = (
-        af.deform(samples, handles, af.DeformOptions(precision=precision, **SETTINGS, **extra))
-        for precision in ("float32", "bfloat16", "bfloat16")
-    )
+
+    def solved(precision, seed):
+        options = af.DeformOptions(precision=precision, seed=seed, **SETTINGS, **extra)
+        return af.deform(samples, handles, options)
+
+    pairs = [[solved(precision, seed) for precision in ("float32", "bfloat16")] for seed in range(4)]
+    (exact, rounded), again = pairs[0], solved("bfloat16", 0)
     places = [field(samples.points) for field in (exact, rounded, again)]
     assert np.abs(places[1] - places[0]).max() > 1e-6  # another arithmetic did run
     assert np.array_equal(places[1], places[2])
-    assert rounded.report.energy < exact.report.energy * (1 + tolerances.ROUNDED_SOLVE)
-    assert rounded.report.handle_error_mean < exact.report.handle_error_mean + 1e-3
+    ratios = [rounded.report.energy / exact.report.energy for exact, rounded in pairs]
+    assert np.mean(ratios) < 1 + tolerances.ROUNDED_SOLVE
+    for exact, rounded in pairs:
+        assert rounded.report.handle_error_mean < exact.report.handle_error_mean + 1e-3
 
 
 def test_stylize_takes_the_option_too():
