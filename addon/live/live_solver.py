@@ -11,8 +11,8 @@ from ..solver.setup import sampled
 from .prefetch import prefetch
 
 STEPS, MOST_SHAPES = 3, 60  # quasi-Newton steps to each shape of a request, and how many of these there are
-# A shape is shown once it is that near the one before, as a share of the size: it is four times as far
-# from its own last at most. After so many seconds any is. A newer request waits for one that is shown.
+# A shape is shown once it is that near the one before, as a share of the size: its own last is then at most
+# four times as far. After so many seconds any is shown. A newer request waits for one that is shown.
 NEAR, LATEST = 7e-4, 0.2
 TOLERANCE = 3e-5  # what single precision sees; a shape then is within about 0.3 % of the size
 PACE = 1 / 60  # seconds from one shape to the next in secondary motion

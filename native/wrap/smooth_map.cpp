@@ -151,14 +151,8 @@ DisplacementMap::DisplacementMap(SmoothMap map, PointsIn points, PointsIn images
                     ? std::pow(1.0 + missed, -2.0)
                     : 0.0;
     jacobians_[i] += trust_[i] * (map_jacobians_[i] - jacobians_[i]);
+    if (back_) jacobians_[i] = jacobians_[i].inverse().eval();
   }
-}
-
-std::vector<Mat3> DisplacementMap::jacobians() const {
-  if (!back_) return jacobians_;
-  std::vector<Mat3> result;
-  for (const Mat3& jacobian : jacobians_) result.push_back(jacobian.inverse());
-  return result;
 }
 
 /// Of some points, with a displacement each.
@@ -179,11 +173,10 @@ Points DisplacementMap::operator()(PointsIn displacements) const {
   std::vector<Index> rows;
   for (Index i = 0; i < displacements.rows(); ++i)
     if (!displacements.row(i).isZero(0.0)) rows.push_back(i);
-  const std::vector<Mat3> slopes = jacobians();
   const auto linear = [&](const Points& given) {
     Points result(given.rows(), 3);
     for (std::size_t k = 0; k < rows.size(); ++k)
-      result.row(k) = (slopes[rows[k]] * given.row(k).transpose()).transpose();
+      result.row(k) = (jacobians_[rows[k]] * given.row(k).transpose()).transpose();
     return result;
   };
   const Points given = rows_of(displacements, rows);

@@ -15,7 +15,7 @@ namespace arapfields {
 /// "Spline Models for Observational Data", section 2.4.
 class ARAPFIELDS_EXPORT_TO_TESTS SmoothMap {
  public:
-  /// From the vertices of a mesh, which lie at `from`, to the places `to` (n,3). Throws Cancelled.
+  /// Takes the surface of a mesh to where its vertices are at `to` (n,3). Throws Cancelled.
   SmoothMap(const TriangleMesh& from, PointsIn to, const Progress& progress = {});
 
   Points at(PointsIn points) const;
@@ -43,7 +43,7 @@ class ARAPFIELDS_EXPORT_TO_TESTS DisplacementMap {
                   bool back = false);
 
   /// In the direction of the displacements.
-  std::vector<Mat3> jacobians() const;
+  const std::vector<Mat3>& jacobians() const { return jacobians_; }
   /// From 0 to 1 (n): how much the map counts.
   const Vector& trust() const { return trust_; }
   /// J δ, and what f(x + δ) − f(x) has beyond that; of far displacements a part. Back: the δ of which that
@@ -56,8 +56,8 @@ class ARAPFIELDS_EXPORT_TO_TESTS DisplacementMap {
   SmoothMap map_;
   Points points_;
   Points at_points_;
-  std::vector<Mat3> jacobians_;
-  std::vector<Mat3> map_jacobians_;  // without those that are given
+  std::vector<Mat3> jacobians_;      // as jacobians() returns them
+  std::vector<Mat3> map_jacobians_;  // the map's own
   Vector trust_;
   bool back_ = false;
 };

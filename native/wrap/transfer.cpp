@@ -92,6 +92,19 @@ RowMatrix<double> values_at(const SurfacePlaces& places, const Triangles& triang
   return result;
 }
 
+/// At the receiving vertices: on the way there these are at places on the source.
+DisplacementMap displacement_map(const WrappedMesh& source, const SurfacePlaces& places, bool back) {
+  SmoothMap map(source.rest, source.moved.vertices);
+  if (back) return {std::move(map), source.rest.vertices, source.moved.vertices, source.jacobians, back};
+  const Triangles& triangles = source.rest.triangles;
+  std::vector<Mat3> jacobians(places.shares.rows());
+  for (Index i = 0; i < places.shares.rows(); ++i)
+    jacobians[i] =
+        places.interpolated(triangles, i, [&](Index v) -> const Mat3& { return source.jacobians[v]; });
+  return {std::move(map), Points(values_at(places, triangles, source.rest.vertices)),
+          Points(values_at(places, triangles, source.moved.vertices)), std::move(jacobians)};
+}
+
 Points moved_by(const DeformationField& field, const TriangleMesh& mesh) {
   validate(mesh);
   return field.at(mesh.vertices);
@@ -176,20 +189,19 @@ WrappedMesh::WrappedMesh(const TriangleMesh& source, PointsIn positions)
   for (std::size_t v = 0; v < areas.size(); ++v) jacobians[v] = jacobians[first[v]];
 }
 
-/// How displacements are carried, prepared by the first call that needs it. Points and their images are those
-/// of the receiving vertices, at rest and moved; the Jacobians lead from the first to the second.
+/// Prepared by the first call that needs it.
 struct Correspondence::Motion {
-  std::optional<WrappedMesh> source;
-  bool back = false;
-  Points points, images;
-  std::vector<Mat3> jacobians;
+  Motion(const WrappedMesh& wrapped, bool is_back) : source(wrapped), back(is_back) {}
+
+  WrappedMesh source;
+  bool back;
   std::mutex mutex;
   std::optional<CarriedMotion> carried;
 };
 
 Correspondence::Correspondence(const WrappedMesh& source, const TriangleMesh& target, Direction direction,
                                const Progress& progress)
-    : motion_(std::make_shared<Motion>()) {
+    : motion_(std::make_shared<Motion>(source, direction == Direction::to_source)) {
   validate(target);
   const bool forward = direction == Direction::to_target;
   giving_ = forward ? source.rest : target;
@@ -197,22 +209,8 @@ Correspondence::Correspondence(const WrappedMesh& source, const TriangleMesh& ta
   const TriangleMesh &on = forward ? source.moved : target, &points = forward ? target : source.moved;
   const WeldedVertices welded(points);
   places_ = places_on(on, points.vertices, welded.normals(welded.first, Eigen::all), progress);
-  Motion& motion = *motion_;
-  motion.source = source;
-  motion.back = !forward;
-  motion.points = source.rest.vertices;
-  motion.images = source.moved.vertices;
-  motion.jacobians = source.jacobians;
-  if (forward) {
-    motion.points = values_at(places_, giving_.triangles, source.rest.vertices);
-    motion.images = values_at(places_, giving_.triangles, source.moved.vertices);
-    motion.jacobians.resize(points.vertices.rows());
-    for (Index i = 0; i < points.vertices.rows(); ++i)
-      motion.jacobians[i] = places_.interpolated(giving_.triangles, i,
-                                                 [&](Index v) -> const Mat3& { return source.jacobians[v]; });
-    return;
-  }
-  for (const Mat3& jacobian : motion.jacobians)
+  if (forward) return;
+  for (const Mat3& jacobian : source.jacobians)
     require(jacobian.determinant() != 0.0, "field", "the wrap flattens a vertex of the source",
             "each must keep a volume about it for the way back");
 }
@@ -231,8 +229,7 @@ Points Correspondence::displacements(PointsIn given) const {
     Motion& motion = *motion_;
     if (!motion.carried)
       motion.carried.emplace(giving_, receiving_, places_,
-                             DisplacementMap(SmoothMap(motion.source->rest, motion.source->moved.vertices),
-                                             motion.points, motion.images, motion.jacobians, motion.back));
+                             displacement_map(motion.source, places_, motion.back));
   }
   return (*motion_->carried)(given);
 }
