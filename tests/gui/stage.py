@@ -11,7 +11,7 @@ import traceback
 import bpy
 import numpy as np
 from support.blender import scenes
-from verdicts import failures
+from verdicts import BEGUN, JUDGED, failures
 
 import addon
 from addon.names import PROPERTY
@@ -45,12 +45,33 @@ def start(steps, names, folder):
 
 
 def end(figures, names, folder):
-    wrong = failures(figures, names)
-    (folder / "checks.json").write_text(json.dumps({**figures, "wrong": wrong}, indent=1))
-    print("\n".join(f"WRONG {line}" for line in wrong) or f"{', '.join(names)}: as expected", flush=True)
-    if wrong:
+    """Judges the part that an error ended, or those that are not judged; leaves Blender."""
+    before = judged(folder)
+    ended = [name for name in names if before.get(name) == BEGUN] or names[-1:]
+    left = [name for name in names if before.get(name) in (None, BEGUN)]
+    for name in ended if "error" in figures else left:
+        judge(figures, name, folder)
+    path = folder / "checks.json"
+    former = json.loads(path.read_text()) if path.exists() else {}
+    path.write_text(json.dumps(former | figures, indent=1))
+    if any(judged(folder).values()):
         os._exit(1)  # quit_blender() gives no exit code
     bpy.ops.wm.quit_blender()
+
+
+def judged(folder):
+    """{part: lines that name what is wrong}, of the parts that have begun."""
+    path = folder / JUDGED
+    return json.loads(path.read_text()) if path.exists() else {}
+
+
+def judge(figures, name, folder):
+    record(name, failures(figures, [name]), folder)
+    print("\n".join(f"WRONG {line}" for line in judged(folder)[name]) or f"{name}: as expected", flush=True)
+
+
+def record(name, lines, folder):
+    (folder / JUDGED).write_text(json.dumps(judged(folder) | {name: lines}, indent=1))
 
 
 def view():

@@ -5,6 +5,9 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 
+JUDGED = "judged.json"  # in the folder: {part: lines that name what is wrong}
+BEGUN = ["it broke off"]  # these lines until the part has ended
+
 
 @dataclass(frozen=True)
 class Rule:
