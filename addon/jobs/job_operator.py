@@ -170,7 +170,7 @@ def with_progress(job, coroutine, label):
 def until_left(job, reference):
     """Coroutine that waits while an object is in Edit Mode, whose end undoes what is written meanwhile."""
     while (item := reference.find()) is not None and item.mode == "EDIT":
-        job.report_main_thread(1.0, translated(refusal(item)))
+        job.report_main_thread(1.0, translated("{name} is in Edit Mode; leave it first", name=item.name))
         yield Pause.WORKER
 
 
