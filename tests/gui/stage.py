@@ -103,6 +103,16 @@ def open_sidebar():
     yield 1.0
 
 
+def as_at_first():
+    """One window, Blender's own tool in hand, and the panel in sight, whatever ran before."""
+    for window in bpy.context.window_manager.windows[1:]:
+        with bpy.context.temp_override(window=window):
+            bpy.ops.wm.window_close()
+    with override():
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+    yield from open_sidebar()
+
+
 def tool(*words):
     subprocess.run(["xdotool", *map(str, words)], check=False)
 

@@ -182,6 +182,7 @@ EXPECTED = {  # of each part, every entry that it finds
         "deformed_by": above(0.1),
         "stack": Rule("with the field", lambda figures: "ARAP Fields" in figures),
         "stylized_by": above(0.01),
+        "stylized_live": is_(0),
         "fitted": TRUE,
     },
     "tutorial": {"handles": is_(2), "deformed_by": above(0.1), "stylized_by": above(0.01)},

@@ -46,9 +46,9 @@ def together(figures, folder, names):
     with stage.override():
         scenes.bar_with_handles()
         bpy.ops.view3d.view_all()
-    yield from stage.open_sidebar()
     for name in sorted(names, key="endings".__eq__):  # of which all that follows is one
         stage.record(name, stage.BEGUN, folder)
+        yield from stage.as_at_first()
         module, given = {**TOGETHER, **SHORTER}[name]
         yield from checks(module, **given)(figures, folder)
         if name != "endings":
