@@ -18,6 +18,7 @@ from addon.names import PROPERTY
 
 PATIENCE = float(os.environ.get("ARAPFIELDS_PATIENCE", "1"))  # times the pauses, for a busy machine
 TAB = (1299, 340)  # where the sidebar's last tab lies in a window of 1600 × 1000
+LEAST = 100  # pixels of the sidebar; its tabs alone take fewer
 
 
 def start(steps, names, folder):
@@ -95,21 +96,36 @@ def show_sidebar():
 
 
 def open_sidebar():
-    """Shows the sidebar and presses the panel's tab, where the window is large enough for that."""
+    """Shows the sidebar and presses the panel's tab, where the window is large enough for that; pressed once
+    more, the tab would hide the panel."""
     show_sidebar()
     yield 1.5
-    if view()[0].width > TAB[0]:
+    if view()[0].width > TAB[0] and not is_panel_seen():
         tool("mousemove", *TAB, "click", 1)
     yield 1.0
 
 
-def as_at_first():
-    """One window, Blender's own tool in hand, and the panel in sight, whatever ran before."""
+def is_panel_seen():
+    region = next(one for one in view()[1].regions if one.type == "UI")
+    return region.width > LEAST and region.active_panel_category == "ARAP Fields"
+
+
+def look():
+    with override():
+        eye = bpy.context.area.spaces.active.region_3d
+    return eye.view_perspective, eye.view_rotation.copy()
+
+
+def as_at_first(first):
+    """One window that looks as `first` tells, Blender's own tool in hand, and the panel in sight, whatever
+    ran before."""
     for window in bpy.context.window_manager.windows[1:]:
         with bpy.context.temp_override(window=window):
             bpy.ops.wm.window_close()
     with override():
         bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+        eye = bpy.context.area.spaces.active.region_3d
+        eye.view_perspective, eye.view_rotation = first
     yield from open_sidebar()
 
 

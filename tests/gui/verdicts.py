@@ -76,7 +76,7 @@ UNDONE = {
 }
 WITHIN, ESCAPED = {"undo_within_drags": ALL_EXACT}, {"undo_escaped": ALL_EXACT}
 EXPECTED = {  # of each part, every entry that it finds
-    "panel": {"languages": above(0), "sections": above(10)},
+    "panel": {"panel_seen": TRUE, "languages": above(0), "sections": above(10)},
     "labels": all_of(EMPTY, "cut_en_US", "cut_de_DE", "cut_narrow_en_US", "cut_narrow_de_DE"),
     "use": {
         "face_dragged": above(1.2),
