@@ -35,6 +35,18 @@ void CorrespondenceTerms::add(Index point, const Vec3& displacement, const Vec3&
   add_form(point, form, form * displacement);
 }
 
+void CorrespondenceTerms::add_along(const SurfacePoints& surface, PointsIn places, double weight,
+                                    double distance) {
+  for (Index i = 0; i < places.rows(); ++i) {
+    const Vec3 displacement = (places.row(i) - surface.points.row(i)).transpose(),
+               normal = surface.normals.row(i);
+    const double share = std::pow(1.0 + displacement.squaredNorm() / (distance * distance), -2);
+    const Mat3 form =
+        weight * share * surface.area_weights[i] * (Mat3::Identity() - normal * normal.transpose());
+    add_form(i, form, form * displacement);
+  }
+}
+
 void CorrespondenceTerms::add_curvature(const WrapTarget& target, const SurfacePoints& surface,
                                         const std::vector<Index>& target_of, double weight) {
   const Index n = surface.points.rows();

@@ -34,6 +34,8 @@ struct ARAPFIELDS_EXPORT_TO_TESTS CorrespondenceTerms {
 
   CorrespondenceTerms(const WrapTarget& target, const SurfacePoints& surface,
                       const CorrespondenceWeights& weights);
+  /// Draws points along the surface to places (n,3); at `distance` a place counts a quarter.
+  void add_along(const SurfacePoints& surface, PointsIn places, double weight, double distance);
 
  private:
   void add_curvature(const WrapTarget& target, const SurfacePoints& surface,

@@ -18,11 +18,22 @@ namespace arapfields {
 namespace {
 
 using namespace wrap_parameters;
+// Tuned: on known maps, with unlike shapes as near to their targets as without.
+
+/// Weight in the last stage of distances along the surface to where the smoothest map through its places
+/// takes it (SmoothingSpline), beside those of correspondences across it: of places it takes the noise.
+constexpr double smooth_weight = 0.6;
+/// Places that make the map, and how little each counts there.
+constexpr Index map_places = 1000;
+constexpr double smoothing = 1e-3;
+/// Distance at which the map counts a quarter, a share of the diagonal: where it misses by more, sheets part.
+constexpr double smooth_distance = 0.002;
+
 using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 /// t: 0 in the first stage, 1 in the last.
 WrapStage stage_at(double t, const WrapOptions& options, const LandmarkPull& pull,
-                   const Schedule& tangential) {
+                   const SlidingSchedule& sliding) {
   const auto most_centers = static_cast<double>(options.centers);
   const Schedule closeness{correspondence_weight.first, correspondence_weight.last * options.closeness},
       centers{std::min(first_centers, most_centers), most_centers};
@@ -30,10 +41,11 @@ WrapStage stage_at(double t, const WrapOptions& options, const LandmarkPull& pul
   stage.correspondences = {.weight = closeness.at(t),
                            .coverage = coverage * options.coverage,
                            .normals = options.normal_weight,
-                           .tangential = tangential.at(t),
+                           .tangential = sliding.tangential.at(t),
                            .curvature = curvature_weight * std::pow(t, 4),
                            .unoriented = unoriented_weight * t * t};
   stage.landmarks = pull.weight * std::pow(pull.growth, t);
+  stage.smoothness = t < 1.0 || !sliding.is_smooth ? 0.0 : smooth_weight;
   stage.rigidity = rigidity.at(t);
   stage.viscosity = viscosity * options.bending;
   stage.center_radius = center_radius.at(t);
@@ -78,6 +90,7 @@ Points moved_normals(const RowMatrix<double>& jacobians, PointsIn normals, Vecto
 struct WrapFlow::StepSamples {
   SurfacePoints surface;  // area weights: the mean of those at rest and now
   RowMatrix<double> jacobians;
+  Points rest;
   Vector rest_area_weights, current_area_weights, weights, bend_weights;
 };
 
@@ -90,6 +103,7 @@ WrapFlow::WrapFlow(const SurfaceSamples& samples, const WrapTarget& target, Poin
       pull_(std::move(pull)) {
   const std::vector<Index> rows = stratified(morton_order(samples.points), moved_samples, random_);
   points_ = rows_of(samples.points, rows);
+  rest_points_ = points_;
   rest_normals_ = rows_of(samples.normals, rows);
   if (samples.weights.size() > 0) weights_ = entries_of(samples.weights, rows);
   if (samples.bend_weights.size() > 0) bend_weights_ = entries_of(samples.bend_weights, rows);
@@ -123,6 +137,7 @@ WrapFlow::StepSamples WrapFlow::draw_samples(Index count) {
   StepSamples chosen;
   chosen.surface.points = rows_of(points_, rows);
   chosen.surface.normals = rows_of(normals, rows);
+  chosen.rest = rows_of(rest_points_, rows);
   chosen.jacobians = jacobians_(rows, Eigen::all);
   if (curvatures_.size() > 0)
     chosen.surface.curvatures =  // as the surface grows, it bends less
@@ -136,6 +151,15 @@ WrapFlow::StepSamples WrapFlow::draw_samples(Index count) {
   if (weights_.size() > 0) chosen.weights = entries_of(weights_, rows);
   if (bend_weights_.size() > 0) chosen.bend_weights = entries_of(bend_weights_, rows);
   return chosen;
+}
+
+Points WrapFlow::smooth_places(PointsIn rest, const Progress& progress) {
+  if (!spline_) {
+    spline_rows_ = farthest_points(rest_points_, map_places).indices;
+    const auto count = static_cast<Index>(spline_rows_.size());
+    spline_.emplace(rows_of(rest_points_, spline_rows_), Vector::Constant(count, smoothing), progress);
+  }
+  return spline_->fit(rows_of(points_, spline_rows_)).at(rest);
 }
 
 /// Centers at farthest-point samples of both surfaces together.
@@ -191,7 +215,11 @@ void WrapFlow::step(const WrapStage& stage, const Progress& progress) {
   // Correspondences.
   CorrespondenceWeights weights = stage.correspondences;
   weights.weight *= unit;
-  const CorrespondenceTerms correspondences(target_, samples.surface, weights);
+  CorrespondenceTerms correspondences(target_, samples.surface, weights);
+  if (stage.smoothness > 0.0)
+    correspondences.add_along(samples.surface, smooth_places(samples.rest, progress),
+                              stage.smoothness * weights.weight * (1.0 + weights.coverage),
+                              smooth_distance * target_.diagonal);
   matched_share_ = correspondences.matched_share;
   progress.report(0.2);
 
@@ -217,12 +245,12 @@ void WrapFlow::step(const WrapStage& stage, const Progress& progress) {
 }
 
 void WrapFlow::run(const WrapOptions& options, const Progress& progress, const std::function<void()>& after,
-                   Schedule tangential) {
+                   const SlidingSchedule& sliding) {
   const double all = options.stages * options.iterations;
   for (int done = 0; done < all; ++done) {
     const int stage = done / options.iterations;
     const double t = options.stages > 1 ? static_cast<double>(stage) / (options.stages - 1) : 1.0;
-    step(stage_at(t, options, pull_, tangential), progress.part(done / all, (done + 1) / all));
+    step(stage_at(t, options, pull_, sliding), progress.part(done / all, (done + 1) / all));
     if (after) after();
   }
 }

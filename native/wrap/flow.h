@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "core/random.h"
@@ -10,6 +11,7 @@
 #include "mesh/surface_samples.h"
 #include "options/wrap.h"
 #include "wrap/parameters.h"
+#include "wrap/smooth_map.h"
 #include "wrap/velocity.h"
 
 namespace arapfields {
@@ -18,11 +20,21 @@ namespace arapfields {
 struct WrapStage {
   CorrespondenceWeights correspondences;
   double landmarks = 20.0;     ///< weight of the landmarks' mean squared distance
+  double smoothness = 0.0;     ///< weight of distances along the surface to the smoothest map
   double rigidity = 1.0;       ///< weight of stretch and shear
   double viscosity = 0.1;      ///< weight of the velocity's gradient
   double center_radius = 0.5;  ///< of the radial functions
   Index centers = 60;          ///< their number
 };
+
+/// How freely a surface slides along the target.
+struct SlidingSchedule {
+  wrap_parameters::Schedule tangential = wrap_parameters::tangential_weight;
+  bool is_smooth = true;  ///< in the last stage the surface follows the smoothest map through its places
+};
+
+/// The sliding of coarse wraps that judge landmarks.
+constexpr SlidingSchedule coarse_sliding{wrap_parameters::coarse_tangential_weight, false};
 
 /// The landmarks that a flow pulls onto their targets; the others go along.
 struct LandmarkPull {
@@ -43,10 +55,9 @@ class WrapFlow {
            PointsIn landmark_targets, LandmarkPull pull, std::uint64_t seed, const Progress& progress = {});
 
   void step(const WrapStage& stage, const Progress& progress);
-  /// All steps of all stages; `after` is called after each. `tangential`: the schedule's weight of tangential
-  /// distances, the less of which the more the surface slides along the target.
+  /// All steps of all stages; `after` is called after each.
   void run(const WrapOptions& options, const Progress& progress, const std::function<void()>& after = {},
-           wrap_parameters::Schedule tangential = wrap_parameters::tangential_weight);
+           const SlidingSchedule& sliding = {});
   const std::vector<FieldStep>& steps() const { return steps_; }
   double matched_share() const { return matched_share_; }
   /// Current positions (k,3) of the landmarks.
@@ -59,17 +70,21 @@ class WrapFlow {
  private:
   struct StepSamples;
   StepSamples draw_samples(Index count);
+  /// Where the smoothest map through the samples' current places takes rest points.
+  Points smooth_places(PointsIn rest, const Progress& progress);
   RadialBasis basis(const WrapStage& stage, PointsIn points);
   void move(const RadialBasis& basis, RowMatrix<double> velocity, PointsIn points);
 
   const WrapTarget& target_;
   Random random_;
-  Points rest_normals_, points_;  // of samples, in spatial order at rest
-  RowMatrix<double> jacobians_;   // (n,9), row-major
+  Points rest_points_, rest_normals_, points_;  // of samples, in spatial order at rest
+  RowMatrix<double> jacobians_;                 // (n,9), row-major
   Vector weights_, bend_weights_;
   RowMatrix<double> curvatures_;  // at rest
   Points landmarks_, landmark_targets_;
   LandmarkPull pull_;
+  std::vector<Index> spline_rows_;
+  std::optional<SmoothingSpline> spline_;  // of these samples, once it is needed
   std::vector<FieldStep> steps_;
   double matched_share_ = 1.0;
 };

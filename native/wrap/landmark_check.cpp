@@ -174,7 +174,7 @@ class Vote {
     WrapFlow flow(samples_, placed, source_.landmarks, at.inverse_of(source_.landmark_targets),
                   {pulled, wrap_parameters::landmark_weight.first * pull},
                   static_cast<std::uint64_t>(options_.seed));
-    flow.run(options_, progress_, {}, wrap_parameters::coarse_tangential_weight);
+    flow.run(options_, progress_, {}, coarse_sliding);
     return {(at.of(flow.landmarks()) - source_.landmark_targets).rowwise().norm() / target_.diagonal,
             flow.stretch(), at.scale * flow.distance() / target_.diagonal};
   }

@@ -43,7 +43,52 @@ Vec3 normal_of(PointsIn vertices, TrianglesIn triangles, Index t) {
 
 }  // namespace
 
-SmoothMap::SmoothMap(const TriangleMesh& from, PointsIn to, const Progress& progress) {
+SmoothingSpline::SmoothingSpline(PointsIn centers, const Vector& smoothing, const Progress& progress) {
+  map_.center_ = centers.colwise().mean();
+  map_.size_ = std::max(diagonal_of(centers), 1e-300);
+  const Points units = map_.in_units(centers);
+  map_.centers_ = units.array();
+
+  Eigen::Matrix<double, Eigen::Dynamic, 4> plane(centers.rows(), 4);
+  plane << Vector::Ones(centers.rows()), units;
+  turn_.compute(plane);
+  const Index all = centers.rows(), inner = all - std::min<Index>(4, all);
+  if (inner == 0) return;
+
+  // (K + S) w + P a = y with Pᵀ w = 0: definite where w = Q₂ z for the columns Q₂ that P leaves out.
+  RowMatrix<double> matrix(all, all);
+  parallel_for(0, all, 16, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i)
+      matrix.row(i) = (units.rowwise() - units.row(i)).rowwise().norm().array().cube().matrix().transpose();
+  });
+  matrix.diagonal() += smoothing;
+  progress.check();
+  const auto q = turn_.householderQ();
+  RowMatrix<double> turned = q.adjoint() * matrix;
+  turned = (q.adjoint() * turned.transpose()).eval();
+  progress.check();
+  across_ = turned.topRightCorner(4, inner);
+  factor_ = cholesky<double>(turned.bottomRightCorner(inner, inner));
+  progress.check();
+}
+
+SmoothMap SmoothingSpline::fit(PointsIn values) const {
+  const Index all = values.rows(), plane = std::min<Index>(4, all), inner = all - plane;
+  const auto q = turn_.householderQ();
+  RowMatrix<double> right = q.adjoint() * values, weights = RowMatrix<double>::Zero(all, 3);
+  if (inner > 0) {
+    weights.bottomRows(inner) = cholesky_solve<double>(factor_, right.bottomRows(inner));
+    right.topRows(plane) -= across_ * weights.bottomRows(inner);
+  }
+  // Centers in a plane leave the affine part open across it: the least one counts.
+  const Eigen::MatrixXd upper = turn_.matrixQR().topRows(plane).triangularView<Eigen::Upper>();
+  SmoothMap map = map_;
+  map.affine_ = upper.completeOrthogonalDecomposition().solve(right.topRows(plane));
+  map.weights_ = (q * weights).array();
+  return map;
+}
+
+SmoothMap surface_map(const TriangleMesh& from, PointsIn to, const Progress& progress) {
   const AreaSampler sampler(from.vertices, from.triangles);
   Random random(0);
   Points before(candidates, 3), after(candidates, 3), normals(candidates, 3), moved_normals(candidates, 3);
@@ -57,49 +102,20 @@ SmoothMap::SmoothMap(const TriangleMesh& from, PointsIn to, const Progress& prog
     normals.row(i) = normal.normalized();
     moved_normals.row(i) = moved / std::sqrt(std::max(moved.norm() * normal.norm(), 1e-300));
   }
-  center_ = before.colwise().mean();
-  size_ = std::max(diagonal_of(before), 1e-300);
   const std::vector<Index> rows = farthest_points(before, chosen).indices;
   const auto count = static_cast<Index>(rows.size()), sides = std::min(beside, count), all = count + sides;
-  Points values(all, 3);
+  Points values(all, 3), centers(all, 3);
   Vector least = Vector::Constant(all, smoothing);
-  Points centers(all, 3);
   centers.topRows(count) = rows_of(before, rows);
   values.topRows(count) = rows_of(after, rows);
+  const double size = diagonal_of(before);
   for (Index i = 0; i < sides; ++i) {
-    const double way = (i % 2 == 0 ? offset : -offset) * size_;
+    const double way = (i % 2 == 0 ? offset : -offset) * size;
     centers.row(count + i) = before.row(rows[i]) + way * normals.row(rows[i]);
     values.row(count + i) = after.row(rows[i]) + way * moved_normals.row(rows[i]);
     least[count + i] = offset_smoothing;
   }
-  centers = in_units(centers);
-  centers_ = centers.array();
-
-  // (K + S) w + P a = y with Pᵀ w = 0: definite where w = Q₂ z for the columns Q₂ that P leaves out.
-  RowMatrix<double> matrix(all, all);
-  parallel_for(0, all, 16, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i)
-      matrix.row(i) =
-          (centers.rowwise() - centers.row(i)).rowwise().norm().array().cube().matrix().transpose();
-  });
-  matrix.diagonal() += least;
-  progress.check();
-  Eigen::Matrix<double, Eigen::Dynamic, 4> plane(all, 4);
-  plane << Vector::Ones(all), centers;
-  const Eigen::HouseholderQR<Eigen::Matrix<double, Eigen::Dynamic, 4>> turn(plane);
-  const auto q = turn.householderQ();
-  RowMatrix<double> turned = q.adjoint() * matrix;
-  turned = (q.adjoint() * turned.transpose()).eval();
-  const RowMatrix<double> right = q.adjoint() * values;
-  progress.check();
-  const RowMatrix<double> factor = cholesky<double>(turned.bottomRightCorner(all - 4, all - 4));
-  RowMatrix<double> inner = RowMatrix<double>::Zero(all, 3);
-  inner.bottomRows(all - 4) = cholesky_solve<double>(factor, right.bottomRows(all - 4));
-  const RowMatrix<double> missed =
-      right.topRows(4) - turned.topRightCorner(4, all - 4) * inner.bottomRows(all - 4);
-  affine_ = turn.matrixQR().topRows<4>().triangularView<Eigen::Upper>().solve(missed);
-  weights_ = (q * inner).array();
-  progress.check();
+  return SmoothingSpline(centers, least, progress).fit(values);
 }
 
 template <class Visit>

@@ -2,6 +2,7 @@
 // The smoothest map of space that takes one surface to another.
 #pragma once
 
+#include <Eigen/QR>
 #include <vector>
 
 #include "core/task.h"
@@ -9,19 +10,14 @@
 
 namespace arapfields {
 
-/// f(x) = A x + b + Σ w_i |x − c_i|³, which minimises Σ |f(c_i) − y_i|² / s_i + |∇³f|², the last over all of
-/// space. A surface's curves and its other side tell how space grows across it; what is noise, it leaves out.
-/// Source: Duchon 1977, "Splines Minimizing Rotation-Invariant Semi-Norms in Sobolev Spaces"; Wahba 1990,
-/// "Spline Models for Observational Data", section 2.4.
+/// f(x) = A x + b + Σ w_i |x − c_i|³.
 class ARAPFIELDS_EXPORT_TO_TESTS SmoothMap {
  public:
-  /// Takes the surface of a mesh to where its vertices are at `to` (n,3). Throws Cancelled.
-  SmoothMap(const TriangleMesh& from, PointsIn to, const Progress& progress = {});
-
   Points at(PointsIn points) const;
   std::vector<Mat3> jacobians(PointsIn points) const;
 
  private:
+  friend class SmoothingSpline;
   using Columns = Eigen::Array<double, Eigen::Dynamic, 3>;
   /// Calls visit(row, x, ways, distances) for each point: in units, and from the centers.
   template <class Visit>
@@ -34,6 +30,29 @@ class ARAPFIELDS_EXPORT_TO_TESTS SmoothMap {
   Columns weights_;
   Eigen::Matrix<double, 4, 3> affine_;  // of 1, x, y, z
 };
+
+/// The map that minimises Σ |f(c_i) − y_i|² / s_i + |∇³f|², the last over all of space: what is noise in y,
+/// it leaves out. Source: Duchon 1977, "Splines Minimizing Rotation-Invariant Semi-Norms in Sobolev Spaces";
+/// Wahba 1990, "Spline Models for Observational Data", section 2.4.
+class ARAPFIELDS_EXPORT_TO_TESTS SmoothingSpline {
+ public:
+  /// Distinct centers c (n,3), one at least, and s (n, positive), how little each weighs: in units in which
+  /// the diagonal of the centers' bounding box is 1. Throws Cancelled.
+  SmoothingSpline(PointsIn centers, const Vector& smoothing, const Progress& progress = {});
+
+  SmoothMap fit(PointsIn values) const;
+
+ private:
+  SmoothMap map_;  // without weights
+  Eigen::HouseholderQR<Eigen::Matrix<double, Eigen::Dynamic, 4>> turn_;
+  RowMatrix<double> across_;
+  RowMatrix<double> factor_;  // empty for four centers and fewer
+};
+
+/// Takes the surface of a mesh to where its vertices are at `to` (n,3). A surface's curves and its other side
+/// tell how space grows across it. Throws Cancelled.
+ARAPFIELDS_EXPORT_TO_TESTS SmoothMap surface_map(const TriangleMesh& from, PointsIn to,
+                                                 const Progress& progress = {});
 
 /// How a smooth map carries displacements δ of points x (n,3), or back those of their images. Where it misses
 /// a point's own image, as where lips part, the Jacobians that are given count instead.

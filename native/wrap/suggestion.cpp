@@ -92,7 +92,7 @@ std::vector<Landmark> suggest_landmarks(const SurfaceSamples& samples, const Imp
                                               warnings, progress.part(0.2, 0.4));
   const WrapTarget placed = target.transformed_back(placement);
   WrapFlow flow(samples, placed, here.points, here.points, {}, seed);
-  flow.run(options, progress.part(0.4, 0.9), {}, coarse_tangential_weight);
+  flow.run(options, progress.part(0.4, 0.9), {}, coarse_sliding);
   const Points moved = placement.of(flow.landmarks());
 
   // Where they land, or the target's end beside it.

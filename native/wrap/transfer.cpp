@@ -94,7 +94,7 @@ RowMatrix<double> values_at(const SurfacePlaces& places, const Triangles& triang
 
 /// At the receiving vertices: on the way there these are at places on the source.
 DisplacementMap displacement_map(const WrappedMesh& source, const SurfacePlaces& places, bool back) {
-  SmoothMap map(source.rest, source.moved.vertices);
+  SmoothMap map = surface_map(source.rest, source.moved.vertices);
   if (back) return {std::move(map), source.rest.vertices, source.moved.vertices, source.jacobians, back};
   const Triangles& triangles = source.rest.triangles;
   std::vector<Mat3> jacobians(places.shares.rows());

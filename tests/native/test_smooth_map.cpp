@@ -51,10 +51,10 @@ BOOST_AUTO_TEST_CASE(affine_maps_are_exact_everywhere) {
   const TriangleMesh torus = shapes::torus(40, 20);
   const auto map = [](const Vec3& x) -> Vec3 { return 1e3 * (affine() * x) + Vec3(4e3, 5e3, -6e3); };
   // Beside the surface the prior is not affine, but weighs little.
-  const SmoothMap turned(torus, moved(torus.vertices, [](const Vec3& x) -> Vec3 {
-                           return 7.0 * (Eigen::AngleAxisd(0.9, Vec3(0.6, 0.0, 0.8)) * x);
-                         }));
-  const SmoothMap found(torus, moved(torus.vertices, map));
+  const SmoothMap turned = surface_map(torus, moved(torus.vertices, [](const Vec3& x) -> Vec3 {
+                                         return 7.0 * (Eigen::AngleAxisd(0.9, Vec3(0.6, 0.0, 0.8)) * x);
+                                       }));
+  const SmoothMap found = surface_map(torus, moved(torus.vertices, map));
   Random random(1);
   for (int i = 0; i < 20; ++i) {
     const Vec3 x = 0.5 * random.direction();
@@ -67,7 +67,7 @@ BOOST_AUTO_TEST_CASE(affine_maps_are_exact_everywhere) {
 
 BOOST_AUTO_TEST_CASE(a_smooth_map_is_found_from_its_surface) {
   const TriangleMesh torus = shapes::torus(80, 40);
-  const SmoothMap found(torus, moved(torus.vertices, bent));
+  const SmoothMap found = surface_map(torus, moved(torus.vertices, bent));
   const Points& x = torus.vertices;
   const std::vector<Mat3> jacobians = found.jacobians(x);
   Random random(2);
@@ -90,7 +90,7 @@ BOOST_AUTO_TEST_CASE(noise_is_left_out) {
   Points noisy = told;
   Random random(3);
   for (Index i = 0; i < noisy.rows(); ++i) noisy.row(i) += noise * random.direction().transpose();
-  const Points found = SmoothMap(torus, noisy).at(torus.vertices);
+  const Points found = surface_map(torus, noisy).at(torus.vertices);
   BOOST_TEST((found - told).rowwise().norm().mean() < left_of_noise * noise);
 }
 
@@ -104,17 +104,30 @@ BOOST_AUTO_TEST_CASE(across_a_plane_space_grows_as_its_area_does) {
       sheet.triangles.row(t++) << i * n + j, (i + 1) * n + j, (i + 1) * n + j + 1;
       sheet.triangles.row(t++) << i * n + j, (i + 1) * n + j + 1, i * n + j + 1;
     }
-  const SmoothMap found(
+  const SmoothMap found = surface_map(
       sheet, moved(sheet.vertices, [](const Vec3& x) -> Vec3 { return {2.0 * x[1], 0.0, -2.0 * x[0]}; }));
   Mat3 told = Mat3::Zero();
   told(0, 1) = 2.0, told(2, 0) = told(1, 2) = -2.0;
   BOOST_TEST((found.jacobians(sheet.vertices.row(40))[0] - told).norm() < rounding);
 }
 
+BOOST_AUTO_TEST_CASE(few_centers_and_flat_ones_have_a_map) {
+  for (const int count : {1, 2, 3, 4, 5, 30})
+    for (const bool is_flat : {true, false}) {
+      Random random(count);
+      Points centers(count, 3);
+      for (Index i = 0; i < count; ++i) centers.row(i) = random.direction().transpose();
+      if (is_flat) centers.col(2).setConstant(0.7);
+      const Points told = moved(centers, [](const Vec3& x) -> Vec3 { return affine() * x + Vec3(4, 5, -6); });
+      const SmoothMap found = SmoothingSpline(centers, Vector::Constant(count, 1e-3)).fit(told);
+      BOOST_TEST((found.at(centers) - told).cwiseAbs().maxCoeff() < rounding);
+    }
+}
+
 BOOST_AUTO_TEST_CASE(displacements_follow_the_map_where_it_fits) {
   const TriangleMesh torus = shapes::torus(80, 40);
   const Points &x = torus.vertices, told = moved(x, bent);
-  const SmoothMap map(torus, told);
+  const SmoothMap map = surface_map(torus, told);
   std::vector<Mat3> given(x.rows());
   for (Index i = 0; i < x.rows(); ++i) given[i] = Mat3::Identity();
   const Points ways = Eigen::RowVector3d(0.05, -0.1, 0.15).replicate(x.rows(), 1);

@@ -9,6 +9,9 @@ import arapfields as af
 
 # Known fields are found again, in % of the target's diagonal: what the coarse triangles of the shapes leave.
 FOUND_AGAIN = 0.5
+# Mean distance from where a smooth map takes the vertices, in % of the target's diagonal: noise of
+# correspondences adds a fifth.
+ALONG_THE_SURFACE = 0.215
 
 
 @pytest.mark.parametrize("landmarks", [0, 4])
@@ -26,6 +29,21 @@ def test_a_moved_scaled_and_bent_shape_is_found_again(figure, samples, landmarks
     assert abs(report.diagonal / np.linalg.norm(np.ptp(target_v, axis=0)) - 1) < 0.02
     away = np.linalg.norm(field(v) - target_v, axis=1).mean() / report.diagonal
     assert away < 0.08  # its points too, nearly: nothing but rigidity keeps them from sliding along it
+
+
+def test_places_follow_a_smooth_map_along_the_surface():
+    v, f, places = cases.star()
+    known = v * (1 + 0.25 * np.exp(-((v - [0.5, 0.3, 0.2]) ** 2).sum(1, keepdims=True) / 0.5))
+    pairs = [(v[i], known[i]) for i in places]
+    some = af.WrapOptions(centers=200)
+    away = [
+        np.linalg.norm(
+            af.wrap(af.sample_mesh(v, f, 4000, seed=seed), af.MeshSdf(known, f), pairs, some)(v) - known,
+            axis=1,
+        ).mean()
+        for seed in range(2)
+    ]
+    assert 100 * np.mean(away) / np.linalg.norm(np.ptp(known, axis=0)) < ALONG_THE_SURFACE
 
 
 def test_shapes_that_are_not_alike_stay_upright():
