@@ -4,7 +4,7 @@ solves and writes them, neither holding more than a few."""
 
 import contextlib
 
-from ..blender.language import translated
+from ..blender.language import about, translated
 from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
 from ..core.runtime.jobs import Item
@@ -75,7 +75,7 @@ class BakePass:
             line = yield from self.unless_it_fails(bake, bake.place(context), failures)
             if line is not None:
                 lines.append(line)
-                failures += [f"{bake.name}: {translated(reason)}" for reason in bake.carried.warnings]
+                failures += [about(bake.name, reason) for reason in bake.carried.warnings]
         if not lines:
             raise UserError("{error}", error=failures.pop())
         return ", ".join(lines)
@@ -89,7 +89,7 @@ class BakePass:
                 return (yield from coroutine)
             except (UserError, ValueError) as error:
                 self.failed.append(bake)
-                failures.append(f"{bake.name}: {translated(error)}")
+                failures.append(about(bake.name, error))
         return None
 
     def discard(self):

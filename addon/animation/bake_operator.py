@@ -4,7 +4,7 @@
 import contextlib
 
 from ..blender.host import has_window
-from ..blender.language import translated
+from ..blender.language import about, translated
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import effective_value, flag
 from ..blender.splat_layouts import holds_splats
@@ -98,8 +98,7 @@ class BakeOperator(JobOperator):
                 yield from with_progress(job, bake.reader.read_setup(context), source.name)
                 bakes.append(bake)
             except (UserError, ValueError, OSError) as error:
-                text = translated(error)
-                self.failures.append(text if source.name in text else f"{source.name}: {text}")
+                self.failures.append(about(source.name, error))
         if not bakes:
             return []
         self.frames_pass = BakePass(bakes, chosen)

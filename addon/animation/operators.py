@@ -4,7 +4,7 @@ from pathlib import Path
 import bpy
 
 from ..blender import modifier_stack
-from ..blender.language import translated
+from ..blender.language import about, translated
 from ..blender.object_references import settings_of, source_of
 from ..blender.property_definitions import effective_value, path_text
 from ..blender.source_operator import SourceOperator
@@ -68,7 +68,7 @@ class CacheOperator(BakeOperator):
             line = translated(
                 "Shape keys of {size} in the .blend and in memory; a cache would take neither", size=size
             )
-            self.warnings.append(f"{bake.name}: {line}")
+            self.warnings.append(about(bake.name, line))
 
 
 class ARAPFIELDS_OT_bake(CacheOperator, bpy.types.Operator):

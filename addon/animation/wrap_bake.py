@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A template that follows a scanned motion: wrapped onto each frame of its target, each from the last."""
 
+import functools
 import math
 import re
 from pathlib import Path
@@ -153,14 +154,14 @@ class WrapBake(ObjectBake):
             shape = self.solver.solve_from_rest(request, task)
             self.reports[frame] = self.solver.report
         except (UserError, ValueError, native.library().Diverged) as error:
-            self.left_out.setdefault(translated(error), []).append(str(plain(frame)))
+            self.left_out.setdefault(translated(error), (error, []))[1].append(str(plain(frame)))
         self.held.add(shape)
 
     def finish(self, task):
-        named = [{"frame": ", ".join(frames), "error": reason} for reason, frames in self.left_out.items()]
+        named = [{"frame": ", ".join(frames), "error": error} for error, frames in self.left_out.values()]
         if not self.reports:
-            told = "; ".join(translated("Frame {frame}: {error}", **one) for one in named)
-            raise UserError("{error}", error=told)
+            told = [UserError("Frame {frame}: {error}", **one) for one in named]
+            raise functools.reduce(lambda a, b: UserError("{first}; {second}", first=a, second=b), told)
         first = next(iter(self.reports.values()))
         self.marks.left_out = first.left_out
         notes = [UserError("note: {text}", text=self.marks.numbered(note)) for note in first.notes]

@@ -16,4 +16,14 @@ def translated(message, **values):
     elif isinstance(message, Exception):
         return str(message)
     text = _lookup(message, CONTEXT)
-    return text.format(**values) if values else text
+    quoted = {key: translated(each) for key, each in values.items() if isinstance(each, Exception)}
+    return text.format(**values | quoted) if values else text
+
+
+def about(name, message):
+    """The same with the name of what it is about before it, unless the message says that itself."""
+    text = translated(message)
+    is_said = text.startswith((f"{name}: ", f"{name} "))
+    if is_said or (isinstance(message, UserError) and message.says(name)):
+        return text
+    return f"{name}: {text}"

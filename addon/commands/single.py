@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..blender.language import about
 from ..blender.object_references import is_source, settings_of
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
@@ -127,7 +128,7 @@ def solve(source, options):
     bpy.context.view_layer.objects.active = source
     reason = failure(call, **given)
     if reason:
-        return {**outcome, "message": f"{source.name}: {reason.removeprefix(f'{source.name}: ')}"}, None
+        return {**outcome, "message": about(source.name, reason)}, None
     item = settings_of(source).results[-1].item
     seconds = time.perf_counter() - begin
     figures = json.loads(item[REPORT])

@@ -14,6 +14,13 @@ class UserError(Exception):
         super().__init__(template.format(**values) if values else template)
         self.template, self.values = template, values
 
+    def says(self, name):
+        """Whether the text has a name in it, be it by an error that is quoted."""
+        return any(
+            value.says(name) if isinstance(value, UserError) else value == name
+            for value in self.values.values()
+        )
+
 
 def as_user_error(error):
     """The same as a UserError."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender.language import translated
+from ..blender.language import about
 from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
@@ -48,7 +48,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         require_reach_supported(handles, values)
         scaled = scaling.ignored(source)
         if scaled is not None:
-            self.warnings.append(f"{source.name}: {translated(scaled)}")
+            self.warnings.append(about(source.name, scaled))
 
         def solve(tracker, rest, samples, weight):
             natives = native_handles(af, handles, rest, samples)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..blender.evaluation import depsgraph_of
 from ..blender.host import has_window
-from ..blender.language import translated
+from ..blender.language import about, translated
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import effective_value
 from ..carried.carrying import Carrying
@@ -91,7 +91,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
             placement.move(bpy.context, item, solved.place)
         applying.solved[owner.session_uid] = pose
         carrying.put(bpy.context, solved.carried)
-        operator.warnings += [f"{owner.name}: {translated(reason)}" for reason in carrying.take_warnings()]
+        operator.warnings += [about(owner.name, reason) for reason in carrying.take_warnings()]
         named = "" if item == owner else item.name
         shown = named + visibility.hidden_note(visibility.show_alone(owner, item))
         return describe(shown.strip(), solved.report, np.ptp(surface.vertices, axis=0).max())

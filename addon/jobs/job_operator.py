@@ -5,7 +5,7 @@ import types
 
 from ..blender import mesh_arrays, vertex_groups
 from ..blender.guide import Guided
-from ..blender.language import translated
+from ..blender.language import about, translated
 from ..blender.object_references import ObjectReference, is_source, owner_of, refusal, source_of
 from ..blender.property_definitions import choice
 from ..core.errors import UserError
@@ -14,12 +14,6 @@ from ..core.runtime.coroutines import Pause, run_to_completion
 from ..core.runtime.progress import JobCancelled
 from ..core.settings.choices import SCOPES
 from .modal import ModalRun
-
-
-def named(label, error):
-    """The text of a UserError, with the item's name before it unless it says that itself."""
-    text = translated(error)
-    return text if error.values.get("name") == label else f"{label}: {text}"
 
 
 class JobOperator(ModalRun, Guided):
@@ -125,11 +119,11 @@ class JobOperator(ModalRun, Guided):
         """Applies what the worker made, reports it, and returns the operator's result."""
         cancelled = job.cancelled and not job.items
         for outcome in job.take_outcomes():
-            self.warnings += [f"{outcome.item.label}: {translated(text)}" for text in outcome.warnings]
+            self.warnings += [about(outcome.item.label, text) for text in outcome.warnings]
             if outcome.cancelled:
                 cancelled = True
             elif outcome.error:
-                self.failures.append(named(outcome.item.label, outcome.error))
+                self.failures.append(about(outcome.item.label, outcome.error))
             else:
                 cancelled |= yield from self.apply_one(job, outcome)
         if cancelled and not self.successes and not self.failures:
@@ -176,7 +170,7 @@ def with_progress(job, coroutine, label):
 def until_left(job, reference):
     """Coroutine that waits while an object is in Edit Mode, whose end undoes what is written meanwhile."""
     while (item := reference.find()) is not None and item.mode == "EDIT":
-        job.report_main_thread(1.0, translated(refusal(item)))
+        job.report_main_thread(1.0, translated("{name} is in Edit Mode; leave it first", name=item.name))
         yield Pause.WORKER
 
 

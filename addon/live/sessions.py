@@ -10,7 +10,7 @@ import contextlib
 import bpy
 
 from ..blender import modifier_stack, timers
-from ..blender.language import translated
+from ..blender.language import about
 from ..blender.object_references import in_scene, settings_of
 from ..blender.redraw import redraw
 from ..core.errors import UserError
@@ -188,7 +188,7 @@ def settle(context, uid):
 def warn(session):
     """Names the carried objects that are left out."""
     for reason in session.carrying.take_warnings():
-        jobs.add_message("WARNING", f"{session.source.name}: {translated(reason)}")
+        jobs.add_message("WARNING", about(session.source.name, reason))
 
 
 def end_with_error(uid, session, error):
@@ -197,8 +197,7 @@ def end_with_error(uid, session, error):
     live.part_with(uid)
     if not session.display.in_place or source is None or in_scene(source):
         take_away(session)
-    text = translated("{error}; live mode ended", error=translated(error))
-    jobs.add_message("ERROR", f"{session.source.name}: {text}")
+    jobs.add_message("ERROR", about(session.source.name, UserError("{error}; live mode ended", error=error)))
 
 
 def take_away(session):
@@ -221,7 +220,7 @@ def restart(context, uid, session):
     try:
         begin(context, source, session.kind, session.keeps_shape)
     except UserError as error:
-        jobs.add_message("ERROR", f"{source.name}: {translated(error)}")
+        jobs.add_message("ERROR", about(source.name, error))
 
 
 def return_all(context):
@@ -232,7 +231,7 @@ def return_all(context):
             begin(context, source, kind, former.keeps_shape)
         except UserError as error:
             settings_of(source).live_kind = ""
-            jobs.add_message("ERROR", f"{source.name}: {translated(error)}")
+            jobs.add_message("ERROR", about(source.name, error))
     live.returning.clear()
 
 

@@ -64,7 +64,7 @@ class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
         names = [bone.name for bone in bones]
         vertices, triangles, firsts = shapes.join(read)
         painted = shapes.joined_stiffness(read)
-        reference = ObjectReference(rig)
+        reference, rest = ObjectReference(rig), rigs.rest_of(rig)
 
         def work(tracker):
             share = 0.4 if options.correctives else 1.0
@@ -89,6 +89,8 @@ class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
         def apply(solved):
             weights, correctives = solved
             armature, items = reference.get(), [shape.get() for shape in read]
+            if rigs.rest_of(armature) != rest:
+                raise UserError("{name} changed while it was worked on; run again", armature)
             for item, shape, own, first in zip(items, read, weights, firsts, strict=False):
                 writing.write_weights(item, names, own, shape.kept)
                 writing.remove_correctives(item)
@@ -106,7 +108,7 @@ class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
             used = np.count_nonzero(sum(np.asarray(own).max(axis=0) > 0 for own in weights))
             return translated("{count} bones move {meshes}", count=used, meshes=names_of(items))
 
-        return Item(rig.name, work, apply, edits=tuple(shape.reference for shape in read))
+        return Item(rig.name, work, apply, edits=(reference, *(shape.reference for shape in read)))
 
 
 def names_of(items):

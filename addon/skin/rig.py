@@ -102,6 +102,20 @@ def bones_of(af, rig):
     return found
 
 
+def rest_of(rig):
+    """What bones are at rest, comparable."""
+    return [
+        (
+            bone.name,
+            bone.parent and bone.parent.name,
+            bone.use_deform,
+            bone.length,
+            *map(tuple, bone.matrix_local),
+        )
+        for bone in rig.data.bones
+    ]
+
+
 def limits_of(bone):
     """(3, 2) the least and the largest turn about each axis of a posed bone; None where it has none."""
     limits, has_any = np.array([[-FREE, FREE]] * 3), False

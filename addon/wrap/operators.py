@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ..blender.host import has_window
-from ..blender.language import translated
+from ..blender.language import about, translated
 from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
@@ -116,7 +116,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
                 hanging.follow(context, source, solved[0].carried, lambda: fitting.put(context))
             followers.follow(context, source)
             empty = empties.holding_nothing(source)
-            self.warnings += [f"{source.name}: {translated(nothing_held(empty))}"] if empty else []
+            self.warnings += [about(source.name, nothing_held(empty))] if empty else []
             return said
 
         return replace(item, apply=apply)

@@ -58,12 +58,40 @@ def test_scripts_that_need_a_blender_of_their_own_get_one():
         groups(["nonsense"])
 
 
-@pytest.mark.parametrize("code", [0, 1])
-def test_the_runner_ends_as_its_blenders_do(code, tmp_path):
+BLENDER = """import json, sys
+from pathlib import Path
+folder, *names = sys.argv[sys.argv.index("--") + 1 :]
+path = Path(folder) / "judged.json"
+path.parent.mkdir(exist_ok=True)
+said = json.loads(path.read_text()) if path.exists() else {}
+for name in names:
+    said[name] = WRONG.get(name, [])
+    path.write_text(json.dumps(said))
+    if name in LAST:
+        sys.exit(1)
+sys.exit(CODE if any(said.values()) else 0)
+"""
+
+
+@pytest.mark.parametrize(
+    ("given", "failed"),
+    [
+        ("WRONG, LAST, CODE = {}, (), 0", []),
+        ("WRONG, LAST, CODE = {'use': ['x is 1']}, (), 1", ["use"]),
+        ("WRONG, LAST, CODE = {'use': ['it broke off']}, ('use',), 0", ["use"]),
+        ("WRONG, LAST, CODE = {}, ('tutorial',), 0", ["tutorial"]),
+        ("raise SystemExit(1)", ["use", "jobs", "tutorial"]),
+    ],
+)
+def test_the_runner_says_of_each_part_how_it_ended(given, failed, tmp_path):
     blender = tmp_path / "blender.py"
-    blender.write_text(f"import sys; sys.exit({code})")
+    blender.write_text(f"{given}\n{BLENDER}")
     environment = {**os.environ, "ARAPFIELDS_WINDOW": f"{sys.executable} {blender}"}
-    command = [sys.executable, "-m", "tests.gui", "--output", str(tmp_path), "use", "tutorial"]
+    command = [sys.executable, "-m", "tests.gui", "--output", str(tmp_path), "use", "jobs", "tutorial"]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
-    assert done.returncode == code
-    assert ("FAILED: use; tutorial" in done.stdout) == bool(code)
+    assert done.returncode == bool(failed), done
+    *parts, last = done.stdout.splitlines()
+    for name, line in zip(("use", "jobs", "tutorial"), parts, strict=True):
+        assert line.split()[0] == name and ("FAILED: " in line) == (name in failed), line
+        assert ("as expected" in line) == (name not in failed)
+    assert last == (f"FAILED: {'; '.join(failed)}" if failed else "all as expected")

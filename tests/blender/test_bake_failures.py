@@ -13,6 +13,8 @@ if IN_BLENDER:
     from support.blender.baking import animated, cancelled_at, saved_animation, stepped
 
     from addon.animation import played
+    from addon.core.runtime import jobs
+    from addon.core.runtime.coroutines import Pause, run_to_completion
 
 pytestmark = pytest.mark.in_blender
 
@@ -54,6 +56,22 @@ def test_a_bake_that_no_longer_fits_is_named():
     content = (folder / "cache/moved.pc2").read_bytes()
     (folder / "cache/moved.pc2").write_bytes(content[:-1])
     assert "bytes" in str(played.problem(bar, look_closely=True))
+
+
+@pytest.mark.parametrize("kind", ["deleted", "changed"])
+def test_an_object_is_named_once(kind):
+    bar, folder = saved_animation()
+    operator = stepped(start=1, end=3, filepath=str(folder / "Bar.pc2"))
+    coroutine = operator.coroutine(bpy.context)
+    while next(coroutine) is not Pause.WORKER:
+        pass
+    if kind == "deleted":
+        bpy.data.objects.remove(bar)
+    else:
+        bar.data.vertices[0].co.x += 0.1
+    run_to_completion(coroutine, wait=lambda: jobs.running().join(0.05))
+    jobs.stop()
+    assert operator.said.startswith("Bar ") and operator.said.count("Bar") == 1, operator.said
 
 
 def test_an_unsaved_file_asks_for_a_place():

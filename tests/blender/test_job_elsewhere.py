@@ -157,5 +157,5 @@ def test_a_bake_says_that_it_lost_a_handle():
     advanced(running, at_frame(4))
     scenes.delete(bpy.data.objects["Moving"])
     assert advanced(running) == {"CANCELLED"}
-    assert running.said == "Bar: Bar changed while it was worked on; run again"
+    assert running.said == "Bar changed while it was worked on; run again"
     assert not [*path.parent.iterdir()]

@@ -11,7 +11,8 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     from support.blender import strings
 
-    from addon.blender.language import translated
+    from addon.blender import language
+    from addon.blender.language import about, translated
     from addon.blender.translations import read_po, translations
     from addon.core.errors import UserError
 
@@ -40,6 +41,31 @@ def test_messages_are_filled_in_after_translation():
     assert translated("{count} frames baked", count=3) == "3 frames baked"
     assert translated(UserError("{name} is not a mesh object", name="{x}")) == "{x} is not a mesh object"
     assert translated(ValueError("as it is")) == "as it is"
+
+
+def test_a_message_names_what_it_is_about_once():
+    lost = UserError("{name} was deleted while it was worked on", name="Bar")
+    said = "Bar was deleted while it was worked on"
+    assert about("Bar", lost) == said and about("Bar", str(lost)) == said
+    assert about("Hat", lost) == f"Hat: {said}"
+    ended = UserError("{error}; live mode ended", error=lost)
+    assert str(ended) == about("Bar", ended) == f"{said}; live mode ended"
+    ended = UserError("{error}; live mode ended", error=ValueError("x"))
+    assert about("Bar", ended) == "Bar: x; live mode ended"
+    other = UserError("The bones of {name} are handles of {source}", name="Rig", source="Bar")
+    assert about("Bar", other) == str(other)
+    assert about("Bar", "Bars were deleted") == "Bar: Bars were deleted"
+
+
+def test_an_error_within_another_is_translated():
+    lookup, german = language._lookup, translations()["de_DE"]
+    language._lookup = lambda text, _: german.get(("*", text), text)
+    try:
+        lost = UserError("{name} was deleted while it was worked on", name="Bar")
+        ended = translated(UserError("{error}; live mode ended", error=lost))
+    finally:
+        language._lookup = lookup
+    assert ended == "Bar wurde während der Arbeit gelöscht; Live-Modus beendet"
 
 
 def test_wrapped_lines_and_every_form_of_a_po_file_are_read():

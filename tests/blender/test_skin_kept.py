@@ -9,12 +9,18 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.baking import cancelled_at
-    from support.blender.skins import person, shirt, weights_of
+    from support.blender.skins import person, rest_rig, shirt, weights_of
     from support.blender.stages import Operator
 
+    from addon.core.runtime import jobs
+    from addon.core.runtime.coroutines import Pause, run_to_completion
     from addon.skin.operators import ARAPFIELDS_OT_skin
 
 pytestmark = pytest.mark.in_blender
+CHANGES = {
+    "removed": lambda bones: bones.remove(bones["Shin.L"]),
+    "moved": lambda bones: setattr(bones["Shin.L"].tail, "x", 0.5),
+}
 ATTEMPTS = 5  # a stage of some milliseconds may pass unseen on a busy machine
 
 
@@ -75,6 +81,25 @@ def test_a_cancel_at_any_stage_changes_nothing(stage):
             break
     assert "cancelled" in operator.said[-1]
     assert seen_of(body) == before and rig.data.pose_position == "POSE"
+
+
+@pytest.mark.parametrize("change", ["removed", "renamed", "moved"])
+def test_bones_that_change_meanwhile_leave_the_meshes_as_they_are(change):
+    body, rig = person()
+    scenes.activate(body, rig)
+    before = seen_of(body)
+    operator = Operator(ARAPFIELDS_OT_skin, poses=8, samples=800)
+    operator.scope = "SELECTED"
+    coroutine = operator.coroutine(bpy.context)
+    while next(coroutine) is not Pause.WORKER:
+        pass
+    if change == "renamed":
+        rig.data.bones["Shin.L"].name = "Calf.L"
+    else:
+        rest_rig(rig, CHANGES[change])
+    run_to_completion(coroutine, wait=lambda: jobs.running().join(0.05))
+    jobs.stop()
+    assert operator.said == ["Rig changed while it was worked on; run again"] and seen_of(body) == before
 
 
 def test_a_linked_armature_poses_meshes_and_hidden_meshes_of_its_collection_too(tmp_path):

@@ -7,13 +7,14 @@ run that need none.
 """
 
 import argparse
+import json
 import os
 import shlex
 import subprocess
 import sys
 from pathlib import Path
 
-from .verdicts import EXPECTED
+from .verdicts import EXPECTED, JUDGED
 
 WINDOW = shlex.split(os.environ.get("ARAPFIELDS_WINDOW", "blender"))
 SIZES = {"film": ("880", "620")}
@@ -24,11 +25,11 @@ SCRIPT = Path(__file__).with_name("window.py")
 def groups(names):
     """What runs in one Blender: each of ALONE by itself, the others together."""
     names = names or [name for name in EXPECTED if "-" not in name and name not in ("film", "pose")]
-    unknown = [name for name in names if name.split("=")[0] not in EXPECTED]
+    unknown = [name for name in names if part_of(name) not in EXPECTED]
     if unknown:
         raise SystemExit(f"no check is named {', '.join(unknown)}; there are {', '.join(EXPECTED)}")
-    alone = [[name] for name in names if name.split("=")[0] in ALONE]
-    others = [name for name in names if name.split("=")[0] not in ALONE]
+    alone = [[name] for name in names if part_of(name) in ALONE]
+    others = [name for name in names if part_of(name) not in ALONE]
     return ([others] if others else []) + alone
 
 
@@ -37,25 +38,38 @@ def main():
     parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("--output", default="out/window")
     options = parser.parse_args()
-    failed = []
+    verdicts = {}
     for group in groups(options.names):
-        first = group[0].split("=")[0]
-        size = SIZES.get(first, ("1600", "1000"))
-        command = [
-            *WINDOW,
-            "--python-use-system-env",
-            "--factory-startup",
-            "--window-geometry",
-            "0",
-            "0",
-            *size,
-        ]
-        command += ["--python-exit-code", "1", "--python", str(SCRIPT), "--"]
-        folder = Path(options.output) / (first if first in ALONE else "")
-        if subprocess.run([*command, str(folder), *group]).returncode:
-            failed.append(" ".join(group))
+        first = part_of(group[0])
+        verdicts |= verdicts_of(group, Path(options.output) / (first if first in ALONE else ""))
+    for name, lines in verdicts.items():
+        print(f"{name:14} {'as expected' if not lines else 'FAILED: ' + '; '.join(lines)}")
+    failed = [name for name, lines in verdicts.items() if lines]
     print(f"FAILED: {'; '.join(failed)}" if failed else "all as expected")
     sys.exit(bool(failed))
+
+
+def part_of(name):
+    return name.split("=")[0]
+
+
+def verdicts_of(group, folder):
+    """{part: what is wrong}; where one breaks off, those after it run in another Blender."""
+    for name in ("checks.json", JUDGED):
+        (folder / name).unlink(missing_ok=True)
+    size, verdicts = SIZES.get(part_of(group[0]), ("1600", "1000")), {}
+    command = [*WINDOW, "--python-use-system-env", "--factory-startup", "--window-geometry", "0", "0", *size]
+    command += ["--python-exit-code", "1", "--python", str(SCRIPT), "--", str(folder)]
+    while group:
+        code, path = subprocess.run([*command, *group]).returncode, folder / JUDGED
+        verdicts |= json.loads(path.read_text()) if path.exists() else {}
+        left = [name for name in group if part_of(name) not in verdicts]
+        if len(left) == len(group):
+            return verdicts | {part_of(name): ["nothing was said"] for name in group}
+        if not left and code and not any(verdicts.values()):
+            verdicts[part_of(group[-1])] = [f"Blender ended with {code}"]
+        group = left
+    return verdicts
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ def checks(figures, folder):
     moving.location.z, moving.rotation_euler.y = 0.45, -0.5
     bar.arapfields.surface = "FIT"  # which has more to show
     yield 4.0  # sections slide to where they stay
+    figures["panel_seen"] = stage.is_panel_seen()
     stage.picture(folder, "handles")
     yield from sections(folder, "panel")
     figures["languages"] = len(bpy.app.translations.locales)

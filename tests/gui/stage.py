@@ -11,13 +11,14 @@ import traceback
 import bpy
 import numpy as np
 from support.blender import scenes
-from verdicts import failures
+from verdicts import BEGUN, JUDGED, failures
 
 import addon
 from addon.names import PROPERTY
 
 PATIENCE = float(os.environ.get("ARAPFIELDS_PATIENCE", "1"))  # times the pauses, for a busy machine
 TAB = (1299, 340)  # where the sidebar's last tab lies in a window of 1600 × 1000
+LEAST = 100  # pixels of the sidebar; its tabs alone take fewer
 
 
 def start(steps, names, folder):
@@ -45,12 +46,33 @@ def start(steps, names, folder):
 
 
 def end(figures, names, folder):
-    wrong = failures(figures, names)
-    (folder / "checks.json").write_text(json.dumps({**figures, "wrong": wrong}, indent=1))
-    print("\n".join(f"WRONG {line}" for line in wrong) or f"{', '.join(names)}: as expected", flush=True)
-    if wrong:
+    """Judges the part that an error ended, or those that are not judged; leaves Blender."""
+    before = judged(folder)
+    ended = [name for name in names if before.get(name) == BEGUN] or names[-1:]
+    left = [name for name in names if before.get(name) in (None, BEGUN)]
+    for name in ended if "error" in figures else left:
+        judge(figures, name, folder)
+    path = folder / "checks.json"
+    former = json.loads(path.read_text()) if path.exists() else {}
+    path.write_text(json.dumps(former | figures, indent=1))
+    if any(judged(folder).values()):
         os._exit(1)  # quit_blender() gives no exit code
     bpy.ops.wm.quit_blender()
+
+
+def judged(folder):
+    """{part: lines that name what is wrong}, of the parts that have begun."""
+    path = folder / JUDGED
+    return json.loads(path.read_text()) if path.exists() else {}
+
+
+def judge(figures, name, folder):
+    record(name, failures(figures, [name]), folder)
+    print("\n".join(f"WRONG {line}" for line in judged(folder)[name]) or f"{name}: as expected", flush=True)
+
+
+def record(name, lines, folder):
+    (folder / JUDGED).write_text(json.dumps(judged(folder) | {name: lines}, indent=1))
 
 
 def view():
@@ -74,12 +96,37 @@ def show_sidebar():
 
 
 def open_sidebar():
-    """Shows the sidebar and presses the panel's tab, where the window is large enough for that."""
+    """Shows the sidebar and presses the panel's tab, where the window is large enough for that; pressed once
+    more, the tab would hide the panel."""
     show_sidebar()
     yield 1.5
-    if view()[0].width > TAB[0]:
+    if view()[0].width > TAB[0] and not is_panel_seen():
         tool("mousemove", *TAB, "click", 1)
     yield 1.0
+
+
+def is_panel_seen():
+    region = next(one for one in view()[1].regions if one.type == "UI")
+    return region.width > LEAST and region.active_panel_category == "ARAP Fields"
+
+
+def look():
+    with override():
+        eye = bpy.context.area.spaces.active.region_3d
+    return eye.view_perspective, eye.view_rotation.copy()
+
+
+def as_at_first(first):
+    """One window that looks as `first` tells, Blender's own tool in hand, and the panel in sight, whatever
+    ran before."""
+    for window in bpy.context.window_manager.windows[1:]:
+        with bpy.context.temp_override(window=window):
+            bpy.ops.wm.window_close()
+    with override():
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+        eye = bpy.context.area.spaces.active.region_3d
+        eye.view_perspective, eye.view_rotation = first
+    yield from open_sidebar()
 
 
 def tool(*words):

@@ -5,6 +5,9 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 
+JUDGED = "judged.json"  # in the folder: {part: lines that name what is wrong}
+BEGUN = ["it broke off"]  # these lines until the part has ended
+
 
 @dataclass(frozen=True)
 class Rule:
@@ -73,7 +76,7 @@ UNDONE = {
 }
 WITHIN, ESCAPED = {"undo_within_drags": ALL_EXACT}, {"undo_escaped": ALL_EXACT}
 EXPECTED = {  # of each part, every entry that it finds
-    "panel": {"languages": above(0), "sections": above(10)},
+    "panel": {"panel_seen": TRUE, "languages": above(0), "sections": above(10)},
     "labels": all_of(EMPTY, "cut_en_US", "cut_de_DE", "cut_narrow_en_US", "cut_narrow_de_DE"),
     "use": {
         "face_dragged": above(1.2),
@@ -179,6 +182,7 @@ EXPECTED = {  # of each part, every entry that it finds
         "deformed_by": above(0.1),
         "stack": Rule("with the field", lambda figures: "ARAP Fields" in figures),
         "stylized_by": above(0.01),
+        "stylized_live": is_(0),
         "fitted": TRUE,
     },
     "tutorial": {"handles": is_(2), "deformed_by": above(0.1), "stylized_by": above(0.01)},

@@ -14,11 +14,13 @@ from mouse import click, keys, pixel, until, until_idle
 from support.blender import scenes
 from tutorial import EAR, JAW
 
+from addon.live import sessions
+
 F3, MINUS = "69", "20"  # their codes: by their names the X server may press Alt too
 MIDDLE = (560, 520)  # of the 3D view
 # In the sidebar with one section open alone: the list's + and its rows, Deform and Stylize.
 PLUS, FROM_EMPTIES, SECOND_ROW = (1261, 159), (1340, 180), (1130, 181)
-DEFORM, STYLIZE = (1140, 223), (1140, 313)
+DEFORM, STYLIZE = (1140, 223), (1140, 343)
 FIT, FIT_SURFACE = (1252, 25), (1130, 80)  # below the header of Implicit Surface, within Advanced
 
 
@@ -183,6 +185,7 @@ def results(figures, folder):
     yield from until_idle(300.0)
     yield 1.5
     figures["stylized_by"] = round(float(np.abs(scenes.world_points(suzanne) - deformed).max()), 3)
+    figures["stylized_live"] = len(sessions.live)
     yield from shot(folder, "stylized")
 
 

@@ -3,7 +3,7 @@
 
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER [PART ...]
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER film=PINS.blend
-Writes checks.json and pictures, says what is wrong, and leaves Blender with exit code 1 for that.
+Writes checks.json, judged.json and pictures, says what is wrong, and leaves Blender with exit code 1 then.
 tests/gui/verdicts.py has what each part must find. ImageMagick's `import` takes pictures; xdotool moves the
 mouse.
 """
@@ -42,14 +42,18 @@ def checks(module, **given):
 
 def together(figures, folder, names):
     """Yields seconds to wait, in which Blender's event loop runs. Ends with a job, which must not hold it."""
+    first = stage.look()
     stage.empty_file()
     with stage.override():
         scenes.bar_with_handles()
         bpy.ops.view3d.view_all()
-    yield from stage.open_sidebar()
-    for name in names:
+    for name in sorted(names, key="endings".__eq__):  # of which all that follows is one
+        stage.record(name, stage.BEGUN, folder)
+        yield from stage.as_at_first(first)
         module, given = {**TOGETHER, **SHORTER}[name]
         yield from checks(module, **given)(figures, folder)
+        if name != "endings":
+            stage.judge(figures, name, folder)
     addon.unregister()
     figures["switched_off"] = not hasattr(bpy.types.Object, "arapfields")
     addon.register()
