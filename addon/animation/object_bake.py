@@ -11,7 +11,7 @@ from ..core.errors import UserError, as_user_error
 from ..handles import empties
 from ..live import sessions
 from ..results import placement, result_objects, visibility
-from ..solver import frame_range, secondary_motion
+from ..solver import contact, frame_range, secondary_motion
 from ..solver.frame_solver import FrameSolver
 from ..solver.setup import sampled
 from ..solver.simulation import Simulation
@@ -49,7 +49,7 @@ class ObjectBake:
         self.reader = SourceReader(context, source, kind, self.in_place)
         if not self.in_place and settings.output == "WARP":  # live mode shows the pose at hand, a bake all
             self.reader.moves_by_itself = has_motion_before(source, in_place=False)
-        self.frames, self.solver, self.error = frames, None, None
+        self.frames, self.solver, self.error, self.obstacles = frames, None, None, contact.all_listed(source)
         beside = None if path is None else functools.partial(cache_beside, path)
         self.carried = CarriedBake(self.reader.carrying, frames, beside, fps, is_shared=part is not None)
         self.simulation = (
@@ -77,6 +77,8 @@ class ObjectBake:
         """The Request at the scene's frame, or the error that ends this object's bake."""
         try:
             source = self.reference.get()
+            if contact.all_listed(source) != self.obstacles:
+                raise SourceChanged(source.name)
             if self.reader.moves_by_itself:
                 self.reader.read_points(context, source)
             self.reader.carrying.expect_motion()

@@ -93,12 +93,22 @@ def notes_on(term, handles, report):
     return found
 
 
+def listed(entry):
+    """The objects that a row of the list means."""
+    return entry.group.all_objects if entry.group is not None else [entry.item]
+
+
+def all_listed(source):
+    """session_uid of each object of the list that is in a scene, shown or not."""
+    rows = settings_of(source).contact.obstacle_list
+    return {item.session_uid for entry in rows for item in listed(entry) if in_scene(item)}
+
+
 def obstacles_of(source):
     """[(object, margin)] of what the list has in the way of a source: each object once."""
     carried, found = {entry.item for entry in settings_of(source).carried}, {}
     for entry in settings_of(source).contact.obstacle_list:
-        listed = entry.group.all_objects if entry.group is not None else [entry.item]
-        for item in listed:
+        for item in listed(entry):
             acts = item is not None and item.type == "MESH" and item != source and item not in carried
             if acts and is_shown(item):
                 found.setdefault(item, from_single_precision(entry.margin))

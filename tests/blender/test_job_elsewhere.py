@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Jobs whose scene the window leaves meanwhile, or whose file is saved elsewhere, or that lose a handle."""
+"""Jobs whose scene the window leaves, or whose file is saved elsewhere, or that lose what they need."""
 
 import contextlib
 
@@ -156,6 +156,24 @@ def test_a_bake_says_that_it_lost_a_handle():
     running = bake()
     advanced(running, at_frame(4))
     scenes.delete(bpy.data.objects["Moving"])
+    assert advanced(running) == {"CANCELLED"}
+    assert running.said == "Bar changed while it was worked on; run again"
+    assert not [*path.parent.iterdir()]
+
+
+@pytest.mark.parametrize("kind", ["deleted", "taken out"])
+def test_a_bake_says_that_it_lost_an_obstacle(kind):
+    bar, path = swelling_bar()
+    bpy.ops.mesh.primitive_cube_add(location=(0, 0, -5))
+    scenes.activate(bpy.context.object, bar)
+    assert bpy.ops.arapfields.add_obstacle() == {"FINISHED"}
+    bar.arapfields.contact.use = True
+    running = bake()
+    advanced(running, at_frame(4))
+    if kind == "deleted":
+        scenes.delete(bpy.data.objects["Cube"])
+    else:
+        bpy.ops.arapfields.remove_obstacle()
     assert advanced(running) == {"CANCELLED"}
     assert running.said == "Bar changed while it was worked on; run again"
     assert not [*path.parent.iterdir()]
