@@ -117,8 +117,8 @@ def look():
 
 
 def as_at_first(first):
-    """One window that looks as `first` tells, Blender's own tool in hand, and the panel in sight, whatever
-    ran before."""
+    """One window that looks as `first` tells at the bar and its handles, Blender's own tool in hand, and the
+    panel in sight, whatever ran before."""
     for window in bpy.context.window_manager.windows[1:]:
         with bpy.context.temp_override(window=window):
             bpy.ops.wm.window_close()
@@ -126,6 +126,12 @@ def as_at_first(first):
         bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
         eye = bpy.context.area.spaces.active.region_3d
         eye.view_perspective, eye.view_rotation = first
+        bpy.context.preferences.system.viewport_aa = "8"
+        if bpy.context.object and bpy.context.object.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        empty_file()
+        scenes.bar_with_handles()
+        bpy.ops.view3d.view_all()
     yield from open_sidebar()
 
 

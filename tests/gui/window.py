@@ -43,10 +43,6 @@ def checks(module, **given):
 def together(figures, folder, names):
     """Yields seconds to wait, in which Blender's event loop runs. Ends with a job, which must not hold it."""
     first = stage.look()
-    stage.empty_file()
-    with stage.override():
-        scenes.bar_with_handles()
-        bpy.ops.view3d.view_all()
     for name in sorted(names, key="endings".__eq__):  # of which all that follows is one
         stage.record(name, stage.BEGUN, folder)
         yield from stage.as_at_first(first)
