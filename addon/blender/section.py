@@ -73,14 +73,18 @@ def with_room(layout, group, name):
     """A column for a property, and what it is shown with: switches in a narrow sidebar, and long ones, have
     the whole width; long names, and names of long choices, a line above."""
     column, prop = layout.column(align=True), group.bl_rna.properties[name]
-    if prop.type == "BOOLEAN" or (prop.type == "ENUM" and prop.is_enum_flag):
+    if prop.type == "BOOLEAN":
         column.use_property_split = characters() >= NARROW and not is_long(prop.name, VALUE)
         return column, {}
     choices = prop.enum_items if prop.type == "ENUM" else ()
-    if not is_long(prop.name, NAME) and not any(is_long(one.name, VALUE) for one in choices):
+    share = FLAG if choices and prop.is_enum_flag else VALUE
+    if not is_long(prop.name, NAME) and not any(is_long(one.name, share) for one in choices):
         return column, {}
     column.label(text=prop.name, text_ctxt=CONTEXT)
-    return column, {"text": ""}
+    if share is VALUE:
+        return column, {"text": ""}
+    column.use_property_split = False  # flags without a text would have no names
+    return column, {}
 
 
 def switched(layout, group, switch, number):
@@ -156,6 +160,7 @@ def presets(layout, name):
 MARGIN, CHARACTER = 80, 5.6  # pixels beside a label, and of a letter, at a scale of 1
 NARROW = 30  # letters
 NAME, VALUE = 0.385, 0.48  # shares of the letters: beside a value, and within it
+FLAG = 0.56  # the same within a value that has no arrow
 
 
 def characters():

@@ -42,9 +42,10 @@ def checks(figures, folder):
         stage.picture(folder, f"narrow-{language}")
         figures[f"cut_narrow_{language}"] = cut(everyday=True)
     interface.language = "en_US"
+    yield from narrower(-8)
 
 
-def narrower():
+def narrower(step=8):
     """Drags the sidebar's edge."""
     window, area, _ = stage.view()
     region = next(one for one in area.regions if one.type == "UI")
@@ -52,9 +53,9 @@ def narrower():
     stage.tool("mousemove", x, y)
     yield 0.5
     stage.tool("mousedown", 1)
-    for step in range(1, 9):
+    for count in range(1, 9):
         yield 0.15
-        stage.tool("mousemove", x + 8 * step, y)
+        stage.tool("mousemove", x + step * count, y)
     stage.tool("mouseup", 1)
     yield 1.0
 
@@ -84,7 +85,7 @@ class Measured(panels.Layout):
         if text.strip():
             self.note(text, values - ICON if is_switch else LABELS * self.width - PADDING)
         for item in prop.enum_items if prop.type == "ENUM" and not options.get("expand") else ():
-            self.note(item.name, values - (0 if prop.is_enum_flag else ICON))
+            self.note(item.name, values - (PADDING if prop.is_enum_flag else ICON))
 
     def operator(self, name, **options):
         given = super().operator(name, **options)
@@ -149,5 +150,5 @@ def cut(everyday=False):
             cls.draw(section, bpy.context)
     for row in rows:
         of_rows(found, row)
-    wide = {text: blf.dimensions(0, text)[0] / scale - room for text, room in found}
-    return sorted((f"{text} by {excess:.0f}" for text, excess in wide.items() if excess > 0), key=len)
+    wide = {(text, blf.dimensions(0, text)[0] / scale - room) for text, room in found}
+    return sorted((f"{text} by {excess:.0f}" for text, excess in wide if excess > 0), key=len)
