@@ -52,6 +52,21 @@ Vector gaps_of(const ContactSet& set, const Points& places) {
 
 }  // namespace
 
+void stiffen_contact(RadialState& s) {
+  if (!s.contact.presses()) return;
+  s.fast.objective.latest()->set_contact_stiffness(
+      {s.problem.basis, s.contact.found(), contact_places(s), s.preconditioner.inverse_factor.latest()});
+}
+
+bool would_press(RadialState& s) {
+  if (!s.contact.presses()) return false;
+  const Points places = contact_places(s);
+  return std::any_of(s.contact.found().planes.begin(), s.contact.found().planes.end(),
+                     [&](const ContactPlane& p) {
+                       return p.pressed(p.gap(places.data()), s.contact.found().stiffness) > 0.0;
+                     });
+}
+
 void press_balanced(RadialState& s) {
   if (!s.contact.presses()) return;
   const RadialObjective<float>& objective = *s.fast.objective.latest();

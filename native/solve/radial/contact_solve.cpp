@@ -26,6 +26,11 @@ constexpr Pace small{0.04, 0.03, 60, 10};
 constexpr double obstacle_step = 0.02;
 /// Quasi-Newton steps between two searches for planes.
 constexpr Index steps_between = 6;
+/// Solves of so many iterations whose handles or obstacles come from far go on to their end, where rounding
+/// does not tell one from another: so many quasi-Newton steps each time, until a round moves no sample
+/// farther, in cube units. Not where the surface meets itself: handles that meet would stop each other.
+constexpr Index patient = 30, steps_to_the_end = 20;
+constexpr double at_rest = 1e-3;
 /// A surface may be so deep beyond a margin, in cube units.
 constexpr double deep = 5e-4;
 /// Pushes at the end, while something is deeper, but not so deep that it is still on its way.
@@ -121,12 +126,21 @@ void report_contact(RadialState& s) {
   }
 }
 
+bool goes_to_its_end(const RadialState& s, Index iterations) {
+  return iterations >= patient && !s.in_one_go && !s.contact.itself();
+}
+
+PointsF sample_places(RadialState& s) { return s.objective(s.fast).sample_values(s.measurements(s.fast)); }
+
 /// Takes the handles from earlier motions to their targets in so many steps, with `on_the_way` iterations in
 /// all but the last.
 void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Index on_the_way,
               Index iterations, double tolerance, const Progress& progress) {
   s.precondition(0.0);
   Index left = iterations;
+  const bool to_its_end = steps > 1 && goes_to_its_end(s, iterations);
+  const Index in_a_round = to_its_end ? steps_to_the_end : steps_between;
+  if (to_its_end) on_the_way = steps_to_the_end;
   double before_it = std::numeric_limits<double>::infinity(), least = before_it;
   s.contact.find(s.shape.coefficients);
   SolveHistory::Start start{s.shape.coefficients, {}};
@@ -136,15 +150,17 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
         motions_between(s.handles.bound(), before, static_cast<double>(k) / static_cast<double>(steps));
     for (Index extra = more_rounds;;) {
       s.objective(s.fast);
+      const PointsF places = to_its_end ? sample_places(s) : PointsF();
       set_reachable_targets(s, wanted);
       const RowMatrix<double> here = s.shape.coefficients;
       if (steps == 1 && extra == more_rounds) start = s.extrapolate();
-      const Index at_once = k < steps ? on_the_way : std::clamp<Index>(left, 2, steps_between);
+      const Index at_once = k < steps ? on_the_way : std::clamp<Index>(left, 2, in_a_round);
       const bool converged = solve_round(s, here, at_once, tolerance, progress);
       if (k < steps) break;
       left -= at_once;
       const double depth = s.contact.deepest();
-      if (converged && depth < deep) break;
+      const bool rests = !to_its_end || (sample_places(s) - places).rowwise().norm().maxCoeff() < at_rest;
+      if (converged && depth < deep && rests) break;
       s.contact.harden(depth > deep && depth < nearly && depth > still_comes_out * before_it);
       before_it = depth;
       if (left <= 0 && (depth < deep || extra-- == 0)) break;
@@ -158,10 +174,12 @@ void approach(RadialState& s, const std::vector<Mat4>& before, Index steps, Inde
 }
 
 /// Takes obstacles that have moved to where they are now, and the surface along.
-void sweep(RadialState& s, const std::vector<Mat4>& motions, double tolerance, const Progress& progress) {
+void sweep(RadialState& s, const std::vector<Mat4>& motions, Index iterations, double tolerance,
+           const Progress& progress) {
   if (s.contact.obstacle_way() == 0.0) return;
   const auto wanted = static_cast<Index>(std::ceil(s.contact.obstacle_way() / obstacle_step));
   const Index parts = std::clamp<Index>(wanted, 1, usual.most_steps);
+  const Index at_once = goes_to_its_end(s, iterations) ? steps_to_the_end : usual.iterations;
   s.precondition(0.0);
   for (Index k = 1; k <= parts; ++k) {
     s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(parts));
@@ -169,7 +187,7 @@ void sweep(RadialState& s, const std::vector<Mat4>& motions, double tolerance, c
     if (k == parts || !s.contact.presses()) continue;
     s.objective(s.fast);
     set_reachable_targets(s, motions);
-    solve_round(s, RowMatrix<double>(s.shape.coefficients), usual.iterations, tolerance, progress);
+    solve_round(s, RowMatrix<double>(s.shape.coefficients), at_once, tolerance, progress);
   }
 }
 
@@ -247,21 +265,6 @@ Points contact_places(RadialState& s) {
   return s.fast.objective.latest()->contact_values(u).cast<double>();
 }
 
-void stiffen_contact(RadialState& s) {
-  if (!s.contact.presses()) return;
-  s.fast.objective.latest()->set_contact_stiffness(
-      {s.problem.basis, s.contact.found(), contact_places(s), s.preconditioner.inverse_factor.latest()});
-}
-
-bool would_press(RadialState& s) {
-  if (!s.contact.presses()) return false;
-  const Points places = contact_places(s);
-  return std::any_of(s.contact.found().planes.begin(), s.contact.found().planes.end(),
-                     [&](const ContactPlane& p) {
-                       return p.pressed(p.gap(places.data()), s.contact.found().stiffness) > 0.0;
-                     });
-}
-
 bool is_deep(RadialState& s) {
   const Points places = contact_places(s);
   return std::any_of(s.contact.found().planes.begin(), s.contact.found().planes.end(),
@@ -281,7 +284,7 @@ void follow_in_contact(RadialState& s, Index iterations, double tolerance,
     if (s.shape.coefficients == s.problem.basis.identity()) before.assign(before.size(), Mat4::Identity());
   }
   const bool goes_on = s.contact.ended_at(s.shape.revision);
-  sweep(s, before, tolerance, progress);
+  sweep(s, before, iterations, tolerance, progress);
   const bool pressed = s.contact.presses();
   s.contact.find(s.shape.coefficients);
   if (!goes_on && s.contact.deepest_outside() > too_deep) {
