@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Solves in contact that go on to their end: what is as small as rounding does not change the pose."""
+"""Solves in contact that go on to their end: what is as small as rounding hardly changes the pose."""
 
 import numpy as np
 import pytest

@@ -27,7 +27,7 @@ constexpr double obstacle_step = 0.02;
 /// Quasi-Newton steps between two searches for planes.
 constexpr Index steps_between = 6;
 /// Solves of so many iterations whose handles or obstacles come from far go on to their end, where rounding
-/// does not tell one from another: so many quasi-Newton steps each time, until a round moves no sample
+/// changes less: so many quasi-Newton steps each time, until a round moves no sample
 /// farther, in cube units. Not where the surface meets itself: handles that meet would stop each other.
 constexpr Index patient = 30, steps_to_the_end = 20;
 constexpr double at_rest = 1e-3;
