@@ -49,7 +49,7 @@ class ObjectBake:
         self.reader = SourceReader(context, source, kind, self.in_place)
         if not self.in_place and settings.output == "WARP":  # live mode shows the pose at hand, a bake all
             self.reader.moves_by_itself = has_motion_before(source, in_place=False)
-        self.frames, self.solver, self.error, self.obstacles = frames, None, None, contact.all_listed(source)
+        self.frames, self.solver, self.error, self.obstacles = frames, None, None, contact.lasting(source)
         beside = None if path is None else functools.partial(cache_beside, path)
         self.carried = CarriedBake(self.reader.carrying, frames, beside, fps, is_shared=part is not None)
         self.simulation = (
@@ -77,7 +77,7 @@ class ObjectBake:
         """The Request at the scene's frame, or the error that ends this object's bake."""
         try:
             source = self.reference.get()
-            if contact.all_listed(source) != self.obstacles:
+            if contact.lasting(source) != self.obstacles:
                 raise SourceChanged(source.name)
             if self.reader.moves_by_itself:
                 self.reader.read_points(context, source)

@@ -14,6 +14,7 @@ from ..blender.property_definitions import from_single_precision
 from ..core.errors import UserError
 from ..core.geometry.spaces import inverse, space_of, transform
 from ..core.runtime import native
+from .frame_range import has_keys
 
 DIGITS = 5  # of an uneven scale: what turns in single precision stays the same solid
 
@@ -98,10 +99,20 @@ def listed(entry):
     return entry.group.all_objects if entry.group is not None else [entry.item]
 
 
-def all_listed(source):
-    """session_uid of each object of the list that is in a scene, shown or not."""
+def lasting(source):
+    """What stays as it is while frames are played, comparable: the objects of the list that are in a scene,
+    and those in the way, but for what its animation hides."""
     rows = settings_of(source).contact.obstacle_list
-    return {item.session_uid for entry in rows for item in listed(entry) if in_scene(item)}
+    in_way = {item.session_uid for item, _ in obstacles_of(source) if not blinks(item)}
+    return {item.session_uid for entry in rows for item in listed(entry) if in_scene(item)}, in_way
+
+
+def blinks(item):
+    """Whether keys, strips or drivers may hide an object."""
+    data, path = item.animation_data, "hide_viewport"
+    if data is None:
+        return False
+    return bool(data.nla_tracks) or has_keys(item, path) or any(one.data_path == path for one in data.drivers)
 
 
 def obstacles_of(source):

@@ -161,19 +161,49 @@ def test_a_bake_says_that_it_lost_a_handle():
     assert not [*path.parent.iterdir()]
 
 
-@pytest.mark.parametrize("kind", ["deleted", "taken out"])
-def test_a_bake_says_that_it_lost_an_obstacle(kind):
+def swelling_bar_over_a_cube():
     bar, path = swelling_bar()
     bpy.ops.mesh.primitive_cube_add(location=(0, 0, -5))
-    scenes.activate(bpy.context.object, bar)
+    cube = bpy.context.object
+    scenes.activate(cube, bar)
     assert bpy.ops.arapfields.add_obstacle() == {"FINISHED"}
     bar.arapfields.contact.use = True
+    return cube, path
+
+
+@pytest.mark.parametrize("kind", ["deleted", "taken out", "hidden", "switched off"])
+def test_a_bake_says_that_it_lost_an_obstacle(kind):
+    cube, path = swelling_bar_over_a_cube()
     running = bake()
     advanced(running, at_frame(4))
     if kind == "deleted":
-        scenes.delete(bpy.data.objects["Cube"])
+        scenes.delete(cube)
+    elif kind == "hidden":
+        cube.hide_set(True)
+    elif kind == "switched off":
+        cube.hide_viewport = True
     else:
         bpy.ops.arapfields.remove_obstacle()
     assert advanced(running) == {"CANCELLED"}
     assert running.said == "Bar changed while it was worked on; run again"
     assert not [*path.parent.iterdir()]
+
+
+@pytest.mark.parametrize("kind", ["keys", "strips", "drivers"])
+def test_an_obstacle_may_come_and_go_by_its_animation(kind):
+    cube, path = swelling_bar_over_a_cube()
+    if kind == "drivers":
+        cube.driver_add("hide_viewport").driver.expression = "frame < 10"
+    else:
+        for frame, hidden in ((1, True), (10, False)):
+            cube.hide_viewport = hidden
+            cube.keyframe_insert("hide_viewport", frame=frame)
+    if kind == "strips":
+        data = cube.animation_data
+        data.nla_tracks.new().strips.new("Strip", 1, data.action)
+        data.action = None
+    for frame in (12, 1):
+        bpy.context.scene.frame_set(frame)
+        assert cube.hide_viewport == (frame == 1)
+    running = bake()
+    assert advanced(running) == {"FINISHED"} and path.exists(), running.said
