@@ -88,9 +88,11 @@ class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
 
         def apply(solved):
             weights, correctives = solved
-            armature, items = reference.get(), [shape.get() for shape in read]
+            armature = reference.get()
             if rigs.rest_of(armature) != rest:
                 raise UserError("{name} changed while it was worked on; run again", armature)
+            with rigs.at_rest(bpy.context, armature):
+                items = [shape.get(armature) for shape in read]
             for item, shape, own, first in zip(items, read, weights, firsts, strict=False):
                 writing.write_weights(item, names, own, shape.kept)
                 writing.remove_correctives(item)

@@ -13,6 +13,8 @@ from ..core.geometry.spaces import inverse, space_of, transform
 from ..handles.movers import matrix_of
 from ..stiffness import painted
 
+LEAST_MOVE = 1e-4  # of a mesh's size: more than what goes along with the armature changes by rounding
+
 
 @dataclass
 class Shape:
@@ -32,10 +34,12 @@ class Shape:
         """The rows of the mesh's own vertices."""
         return weights if self.nearest is None else weights[self.nearest]
 
-    def get(self):
-        """The object; UserError where its mesh is another by now."""
+    def get(self, rig):
+        """The object; UserError where its mesh is another by now, or lies elsewhere beside the bones."""
         item = self.reference.get()
-        if mesh_arrays.fingerprint(item.data) != self.mark:
+        moved = np.abs(transform(to_armature(item, rig), self.arrays.vertices) - self.vertices).max()
+        is_there = moved <= LEAST_MOVE * np.ptp(self.vertices, axis=0).max()
+        if mesh_arrays.fingerprint(item.data) != self.mark or not is_there:
             raise UserError("{name} changed while it was worked on; run again", item)
         return item
 
@@ -54,8 +58,8 @@ def place(item, rig):
 
 def read(context, item, rig, groups):
     """The Shape of an object while the armature is at rest; UserError where there is nothing to skin."""
-    space_of(item.matrix_world, item.name)
     refuse(painted.refusal(item))
+    to_rig = to_armature(item, rig)
     before = [m for m in list(item.modifiers)[: place(item, rig)] if m.show_viewport]
     with modifier_stack.mesh_of(context, item, before) as mesh:
         arrays = mesh_arrays.arrays_of(item, mesh)
@@ -63,7 +67,6 @@ def read(context, item, rig, groups):
         stiffness = painted.of_weights(item, vertex_groups.weights_in(mesh, painted_groups))
     own = mesh_arrays.positions(item.data)
     keeps = all(m.type in modifier_stack.KEEPING for m in before) and len(own) == len(arrays.vertices)
-    to_rig = inverse(matrix_of(rig)) @ matrix_of(item)
     mirrored = np.linalg.det(to_rig[:3, :3]) < 0
     return Shape(
         ObjectReference(item),
@@ -76,6 +79,13 @@ def read(context, item, rig, groups):
         stiffness,
         mesh_arrays.fingerprint(item.data),
     )
+
+
+def to_armature(item, rig):
+    """(4, 4) from an object's coordinates into the armature's; UserError where a scale flattens one."""
+    for one in (item, rig):
+        space_of(one.matrix_world, one.name)
+    return inverse(matrix_of(rig)) @ matrix_of(item)
 
 
 def nearest(vertices, points):

@@ -83,8 +83,8 @@ def test_a_cancel_at_any_stage_changes_nothing(stage):
     assert seen_of(body) == before and rig.data.pose_position == "POSE"
 
 
-@pytest.mark.parametrize("change", ["removed", "renamed", "moved"])
-def test_bones_that_change_meanwhile_leave_the_meshes_as_they_are(change):
+def changed_meanwhile(change):
+    """What Skin to Armature says where something changes meanwhile, and what the body was and is then."""
     body, rig = person()
     scenes.activate(body, rig)
     before = seen_of(body)
@@ -93,13 +93,50 @@ def test_bones_that_change_meanwhile_leave_the_meshes_as_they_are(change):
     coroutine = operator.coroutine(bpy.context)
     while next(coroutine) is not Pause.WORKER:
         pass
-    if change == "renamed":
-        rig.data.bones["Shin.L"].name = "Calf.L"
-    else:
-        rest_rig(rig, CHANGES[change])
+    change(body, rig)
+    bpy.context.view_layer.update()
     run_to_completion(coroutine, wait=lambda: jobs.running().join(0.05))
     jobs.stop()
-    assert operator.said == ["Rig changed while it was worked on; run again"] and seen_of(body) == before
+    return operator.said, before, seen_of(body)
+
+
+@pytest.mark.parametrize("change", ["removed", "renamed", "moved"])
+def test_bones_that_change_meanwhile_leave_the_meshes_as_they_are(change):
+    def changed(_, rig):
+        if change == "renamed":
+            rig.data.bones["Shin.L"].name = "Calf.L"
+        else:
+            rest_rig(rig, CHANGES[change])
+
+    said, before, now = changed_meanwhile(changed)
+    assert said == ["Rig changed while it was worked on; run again"] and now == before
+
+
+@pytest.mark.parametrize("which", ["body", "rig"])
+def test_what_moves_beside_the_armature_meanwhile_is_not_skinned(which):
+    def moved(body, rig):
+        (body if which == "body" else rig).location.x = 2
+
+    said, before, now = changed_meanwhile(moved)
+    assert said == ["Body changed while it was worked on; run again"] and now == before
+
+
+def test_what_moves_with_the_armature_meanwhile_is_skinned():
+    def both(body, rig):
+        rig.pose.bones["Thigh.L"].rotation_quaternion = (0.9, 0.1, 0, 0)
+        for item in (body, rig):
+            item.location, item.rotation_euler = (300, 0, 0), (0.3, 1, 2)
+
+    said, before, now = changed_meanwhile(both)
+    assert said[0].startswith("Rig: 5 bones move Body") and now != before
+
+
+@pytest.mark.parametrize("which", ["Body", "Rig"])
+def test_a_scale_that_flattens_is_named(which):
+    scenes.activate(*person())
+    bpy.data.objects[which].scale.z = 0
+    with pytest.raises(RuntimeError, match=f"{which}: its scale flattens it"):
+        bpy.ops.arapfields.skin(scope="SELECTED", poses=8, samples=800)
 
 
 def test_a_linked_armature_poses_meshes_and_hidden_meshes_of_its_collection_too(tmp_path):
