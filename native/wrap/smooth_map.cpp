@@ -23,7 +23,7 @@ namespace {
 /// Points on the surface, of which so many are chosen far from each other.
 constexpr Index candidates = 4000, chosen = 1000;
 /// How little a point weighs.
-constexpr double smoothing = 5e-3;
+constexpr double smoothing = 2e-3;
 /// Points beside the surface, where space grows across as the area's square root: they tell what a plane does
 /// not. How far they lie, and how little they weigh.
 constexpr Index beside = 250;
