@@ -8,6 +8,7 @@ import numpy as np
 from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..core.errors import UserError
 from ..names import OFFSETS, TURNS
+from . import keys
 
 # Attributes' types: (name of a value in Blender, numbers a value, whether values between two make sense).
 TYPES = {
@@ -89,6 +90,12 @@ class Given:
             own = [a.name for a in mesh.attributes if a.is_required or a.is_internal]
             edges = np.empty(2 * len(mesh.edges), np.int32)
             mesh.edges.foreach_get("vertices", edges)
+        values = keys.since_wrapped(source)
+        if values is not None:
+            before, stack = modifier_stack.before(source, in_place=True), list(source.modifiers)
+            self.rest = keys.shape_at(context, source, before, values)
+            through = stack[: modifier_stack.place(source) + 1]
+            self.moved = keys.shape_at(context, source, through, values)
         kept = {*own, *names, OFFSETS, TURNS, "custom_normal"}
         self.edges = edges.reshape(-1, 2)
         self.uv_maps = [one for one in layers if one.name in names]

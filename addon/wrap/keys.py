@@ -7,9 +7,11 @@ second time: one further key takes back those of the wrap. At them the target ke
 
 import json
 
+import bpy
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack, vertex_groups
+from ..blender.evaluation import updated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..names import NEUTRAL_KEY
@@ -47,8 +49,33 @@ def shown(source):
     return {block.name: block.value for block in blocks if block.value and not block.mute}
 
 
-def carry(source, target, places):
-    """Carries the keys over by where the target lies on the source; returns how many."""
+def since_wrapped(source):
+    """{name: value} of the keys as the source was wrapped with them; None where they are as they were."""
+    kept = settings_of(source).wrap.shown_keys
+    values = json.loads(kept) if kept else {}
+    if not kept or values == shown(source):
+        return None
+    return {block.name: values.get(block.name, 0.0) for block in of(source)}
+
+
+def shape_at(context, item, kept, values):
+    """(n, 3) vertices as these modifiers of an object make them, where keys have these values by name."""
+    mesh = item.data.copy()
+    try:
+        with modifier_stack.staged(context, item, kept) as (copied, layer):
+            copied.data, copied.show_only_shape_key = mesh, item.show_only_shape_key and not values
+            if mesh.shape_keys is not None:
+                mesh.shape_keys.animation_data_clear()
+            for name, value in values.items():
+                key = mesh.shape_keys.key_blocks[name]
+                key.mute, key.value = False, value
+            return mesh_arrays.positions(copied.evaluated_get(updated(layer)).data)
+    finally:
+        bpy.data.meshes.remove(mesh)
+
+
+def carry(source, target, displacements):
+    """Carries the keys over by what makes the target's displacements of the source's; returns how many."""
     blocks = of(source)
     if not blocks:
         return 0
@@ -57,7 +84,7 @@ def carry(source, target, places):
         target.shape_key_add(name=basis.name, from_mix=False)
     points = {block: points_of(block) for block in given}
     offsets = np.array([points[block] - points[block.relative_key] for block in blocks])
-    carried = dict(zip(blocks, places.displacements(offsets), strict=True))
+    carried = dict(zip(blocks, displacements(offsets), strict=True))
     made = {block: key_named(target, block.name) for block in blocks}
     made[basis] = target.data.shape_keys.reference_key
     start_of = {block: block.relative_key if block.relative_key in made else basis for block in blocks}

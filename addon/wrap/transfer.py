@@ -14,11 +14,14 @@ from ..core.geometry.spaces import transform
 from ..core.runtime import native
 from ..core.settings.choices import TRANSFERRED
 from ..handles.empties import matrix_of
+from ..names import NEUTRAL_KEY
 from ..results.placement import single_user
 from . import garments, keys, rigs
 from .given import Given
 
 LEAST_WEIGHT = 1e-4  # what is below is no member of a group
+LEAST_POSE = 1e-5  # of the target's size: an armature at rest moves by less, by rounding
+LOOKED_AT = 1000  # of the target's vertices, at most, to see whether it was wrapped onto as it is posed
 
 
 def not_wrapped(source):
@@ -41,6 +44,10 @@ def refusal(source, target):
     return mesh_arrays.nothing_in(target.name, len(target.data.vertices), len(target.data.polygons))
 
 
+def keeps_vertices(modifier):
+    return modifier.type in modifier_stack.KEEPING or modifier_stack.is_field(modifier)
+
+
 class Transfer:
     """One source and one target: what is carried goes from the first's wrapped mesh to the second's own."""
 
@@ -50,9 +57,27 @@ class Transfer:
         self.given = Given(context, source)
         to_target = np.linalg.inv(matrix_of(target)) @ matrix_of(source)
         self.moved = transform(to_target, self.given.moved)  # in the target's coordinates, as keys are
-        self.own = mesh_arrays.positions(target.data)
-        self.places = self.places_of(self.own, mesh_arrays.triangles(target.data))
-        self.notes = []
+        self.triangles, self.notes = mesh_arrays.triangles(target.data), []
+        self.unposed = self.seen(is_posed=False)
+        self.own = min((self.unposed, self.seen(is_posed=True)), key=self.distance)
+        self.places = self.places_of(self.own, self.triangles)
+
+    def seen(self, is_posed):
+        """(n, 3) vertices of the target as a wrap sees them, by its own keys, and by its modifiers or not."""
+        target, blocks = self.target, self.target.data.shape_keys
+        own = mesh_arrays.positions(target.data)
+        kept = [one for one in target.modifiers if is_posed and one.show_viewport and keeps_vertices(one)]
+        if not kept and blocks is None:
+            return own
+        given = {NEUTRAL_KEY, *(block.name for block in keys.of(self.source))}  # the wrap was without these
+        values = dict.fromkeys(given & set(blocks.key_blocks.keys() if blocks else ()), 0.0)
+        shape = keys.shape_at(self.context, target, kept, values)
+        return shape if len(shape) == len(own) else own
+
+    def distance(self, vertices):
+        """How far from the wrapped source most of these are: a pose may have come after the wrap."""
+        wrapped = native.library().MeshSdf(self.moved, self.given.triangles)
+        return np.median(np.abs(wrapped(vertices[:: -(-len(vertices) // LOOKED_AT)])))
 
     def places_of(self, vertices, triangles):
         """Where the vertices of a mesh lie on the wrapped source."""
@@ -81,7 +106,15 @@ class Transfer:
         return done
 
     def keys(self):
-        return keys.carry(self.source, self.target, self.places)
+        return keys.carry(self.source, self.target, self.displacements)
+
+    def displacements(self, offsets):
+        """Those of the target's keys, by (k, n, 3) of the source's: what poses the target poses these too."""
+        carried = self.places.displacements(offsets)
+        if np.abs(self.own - self.unposed).max() <= LEAST_POSE * np.ptp(self.own, axis=0).max():
+            return carried
+        seen, unposed = (self.own, self.triangles), (self.unposed, self.triangles)
+        return native.library().Correspondence(self.unposed, seen, unposed).displacements(carried)
 
     def groups(self):
         done = 0
@@ -170,7 +203,7 @@ class Transfer:
         return done
 
     def carried(self):
-        own = self.own, mesh_arrays.triangles(self.target.data)
+        own = self.own, self.triangles
         done, notes = garments.copies(
             self.context, self.source, self.target, self.given, own, rigs.pairs(self.source, self.target)
         )
