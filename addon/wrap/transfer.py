@@ -21,7 +21,8 @@ from .given import Given
 
 LEAST_WEIGHT = 1e-4  # what is below is no member of a group
 LEAST_POSE = 1e-5  # of the target's size: an armature at rest moves by less, by rounding
-LOOKED_AT = 1000  # of the target's vertices, at most, to see whether it was wrapped onto as it is posed
+FAR = 0.05  # of the target's diagonal: a wrap leaves half of the vertices nearer than that
+LOOKED_AT = 1000  # vertices at most, to see how far two surfaces are apart
 
 
 def not_wrapped(source):
@@ -48,6 +49,12 @@ def keeps_vertices(modifier):
     return modifier.type in modifier_stack.KEEPING or modifier_stack.is_field(modifier)
 
 
+def distance(points, mesh):
+    """How far from the surface of a mesh, its vertices and triangles, half of the points are at most."""
+    surface = native.library().MeshSdf(*mesh)
+    return np.median(np.abs(surface(points[:: -(-len(points) // LOOKED_AT)])))
+
+
 class Transfer:
     """One source and one target: what is carried goes from the first's wrapped mesh to the second's own."""
 
@@ -60,6 +67,7 @@ class Transfer:
         self.triangles, self.notes = mesh_arrays.triangles(target.data), []
         self.unposed = self.seen(is_posed=False)
         self.own = min((self.unposed, self.seen(is_posed=True)), key=self.distance)
+        self.refuse_elsewhere()
         self.places = self.places_of(self.own, self.triangles)
 
     def seen(self, is_posed):
@@ -75,9 +83,15 @@ class Transfer:
         return shape if len(shape) == len(own) else own
 
     def distance(self, vertices):
-        """How far from the wrapped source most of these are: a pose may have come after the wrap."""
-        wrapped = native.library().MeshSdf(self.moved, self.given.triangles)
-        return np.median(np.abs(wrapped(vertices[:: -(-len(vertices) // LOOKED_AT)])))
+        """How far from the wrapped source these are: a pose may have come after the wrap."""
+        return distance(vertices, (self.moved, self.given.triangles))
+
+    def refuse_elsewhere(self):
+        """UserError where most of the wrapped source and most of the target lie far from the other."""
+        far = FAR * np.linalg.norm(np.ptp(self.own, axis=0))
+        if self.distance(self.own) > far and distance(self.moved, (self.own, self.triangles)) > far:
+            text = "{name} does not lie on {target}; move it back, or wrap again"
+            raise UserError(text, self.source, target=self.target.name)
 
     def places_of(self, vertices, triangles):
         """Where the vertices of a mesh lie on the wrapped source."""

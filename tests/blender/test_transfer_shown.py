@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transfers where what is seen is not the basis: values of keys and poses, of both objects."""
+"""Transfers where not all is as it was wrapped: values of keys, poses and places of both objects."""
 
 import json
 
@@ -118,3 +118,16 @@ def test_keys_that_are_tried_after_a_wrap_do_not_mislead_it():
     assert np.abs(moved_by(target, "Up") - (raised(shown) - shown)).mean() < 0.02 * 0.2
     assert keys_there["Bend"].value == 1.0 and "ARAP Neutral" not in keys_there
     assert bend.value == 1.0 and len(bpy.data.meshes) == 2 and len(bpy.data.scenes) == 1
+
+
+@pytest.mark.parametrize("moved", ["Bar", "Scan"])
+def test_a_wrap_that_was_moved_off_its_target_is_not_handed_on(moved):
+    """To look at both beside each other; every weight came from the nearest end."""
+    item, target = pair()
+    lay(item, target)
+    bpy.data.objects[moved].location.x += 3
+    with pytest.raises(RuntimeError, match="Bar does not lie on Scan; move it back, or wrap again"):
+        bpy.ops.arapfields.transfer()
+    assert not target.vertex_groups and target.data.shape_keys is None
+    bpy.data.objects[moved].location.x -= 3
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"} and wrong_weights(target) < 1e-3
