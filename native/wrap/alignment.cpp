@@ -215,8 +215,9 @@ Vector WrapSource::distances(const Similarity& placement) const {
 void check_landmarks(const WrapSource& source, const WrapTarget& target) {
   const Index count = source.landmarks.rows();
   for (Index i = 0; i < count; ++i)
-    require(source.landmarks.row(i).allFinite() && source.landmark_targets.row(i).allFinite(),
-            landmark_name(i), "a coordinate is NaN or infinite", "all must be finite");
+    require(std::isfinite(source.landmarks.row(i).squaredNorm()) &&
+                std::isfinite(source.landmark_targets.row(i).squaredNorm()),
+            landmark_name(i), "a coordinate is NaN, infinite or too large", "squares must be finite");
   if (count == 0) return;
   require_on(source.points, source.landmarks, "its place at rest");
   require_on(target.points, source.landmark_targets, "its place on the target");

@@ -115,6 +115,8 @@ WrapTarget wrap_target(const ImplicitFunction& function, Index count, std::uint6
   for (Index i = 0; i < target.normals.rows(); ++i)  // of triangles without area
     if (!(target.normals.row(i).squaredNorm() > 0.5)) target.normals.row(i) = Vec3::UnitZ().transpose();
   target.diagonal = diagonal_of(target.points);
+  require(std::isfinite(target.points.squaredNorm()), "target", "its coordinates are too large",
+          "their squares must be finite");
   target.spacing = mean_spacing(target.points);
   target.tree = OrientedPoints(target.points, target.normals);
   target.interior = Vector::Ones(target.points.rows());

@@ -86,6 +86,11 @@ def test_bad_input_is_named(tmp_path):
     for bounds in (*odd, np.ones((2, 3), complex), np.broadcast_to(np.zeros(3), (2_000_000_000, 3))):
         with pytest.raises(af.InvalidInput, match="bounds"):
             af.sdf_grid(Ball(), 4, bounds=bounds)
+    for far in (np.nan, np.inf, 1e200):
+        ball = Ball()
+        ball.radius = far
+        with pytest.raises(af.InvalidInput, match="sdf: a distance is NaN, infinite or beyond single"):
+            af.sdf_grid(ball, 4)
     with pytest.raises(af.InvalidInput, match="extension"):
         af.save_grid(tmp_path / "grid.txt", *af.sdf_grid(Ball(), 4))
     grid = dict(zip(("values", "origin", "spacing"), af.sdf_grid(Ball(), 4), strict=True))

@@ -133,6 +133,16 @@ def test_targets_without_a_surface_are_named(samples):
         af.MeshSdf(np.zeros((0, 3)), np.zeros((0, 3), int))
 
 
+def test_coordinates_without_a_square_are_named(figure, samples):
+    v, f = figure
+    options = af.WrapOptions(**cases.SMALL)
+    with pytest.raises(af.InvalidInput, match="target: its coordinates are too large"):
+        af.wrap(samples, af.MeshSdf(1e200 * v, f), [], options)
+    for pair in ([v[0], [1e200, 0, 0]], [[0, 1e200, 0], v[0]]):
+        with pytest.raises(af.InvalidInput, match=r"landmarks\[0\]: a coordinate is .* too large"):
+            af.wrap(samples, af.MeshSdf(v, f), [pair], options)
+
+
 def test_cancel_and_progress(figure, samples):
     v, f = figure
     task = af.Task()

@@ -82,6 +82,8 @@ def sdf_grid(
             raise InvalidInput(
                 f"sdf: shape {distances.shape} for {len(nodes)} points; one number each is needed"
             )
+        if not (np.abs(distances) <= np.finfo(np.float32).max).all():
+            raise InvalidInput("sdf: a distance is NaN, infinite or beyond single precision")
         flat[begin : begin + CHUNK] = distances
     return values, corners[0], spacing
 

@@ -83,6 +83,7 @@ def bad_meshes(folder, mesh_file):
         "no_faces.obj": TRIANGLE,
         "no_faces.ply": header + "end_header\n0 0 0\n1 0 0\n0 1 0\n",
         "nan.obj": "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+        "far.obj": "v 1e200 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
         "inf.off": "OFF\n3 1 0\ninf 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
         "index.obj": TRIANGLE + "f 1 2 9\n",
         "truncated.off": "OFF\n8 12 0\n0 0 0\n1 0 0\n",

@@ -65,9 +65,10 @@ def read_mesh(path):
             )
     if triangles.size == 0:
         raise InvalidInput(f"{path}: has no faces (or is cut off); a triangle mesh is needed")
-    if not np.isfinite(vertices).all():
-        first = int(np.flatnonzero(~np.isfinite(vertices).all(1))[0])
-        raise InvalidInput(f"{path}: vertex {first} is NaN or infinite; coordinates must be finite")
+    fits = (np.abs(vertices) <= np.finfo(np.float32).max).all(axis=1)  # what is written is single precision
+    if not fits.all():
+        first = int(np.flatnonzero(~fits)[0])
+        raise InvalidInput(f"{path}: vertex {first} is NaN, infinite or beyond single precision")
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise InvalidInput(f"{path}: a face names a vertex beyond the {len(vertices)} there are")
     corners = vertices[triangles]
