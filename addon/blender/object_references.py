@@ -67,12 +67,20 @@ def is_source(item):
     return item.type == "MESH" or holds_splats(item)
 
 
+def active_of(context):
+    """The active object, or None: the one that a script's temp_override() names before the view layer's."""
+    window, given = context.window, getattr(context, "active_object", None)
+    if window is not None and given not in (None, window.view_layer.objects.active):
+        return given
+    return context.view_layer.objects.active if context.view_layer else None
+
+
 def source_of(context):
     """The object that the panel and the operators work on, or None.
 
     The active object when it is a source; the owner of the active handle or result.
     """
-    active = context.view_layer.objects.active if context.view_layer else None
+    active = active_of(context)
     if active is None:
         return None
     owner = owner_of(active)

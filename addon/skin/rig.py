@@ -14,7 +14,7 @@ WIDEST, FREE = np.radians(60.0), np.radians(25.0)
 
 def rig_of(context):
     """The armature: the active or a selected object, else the one that the active mesh follows; or None."""
-    active, selected = context.view_layer.objects.active, context.selected_objects
+    active, selected = object_references.active_of(context), context.selected_objects
     found = next((item for item in (active, *selected) if item and item.type == "ARMATURE"), None)
     if found is None and active is not None and active.type == "MESH":
         found = next((rig for rig in followed(active)), None)

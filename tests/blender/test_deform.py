@@ -166,6 +166,24 @@ def test_same_seed_same_result():
     assert np.array_equal(*reports)
 
 
+def test_a_script_names_the_object_by_an_override_of_the_context():
+    """As for Blender's own operators; whatever was active was deformed."""
+    bar, _, moving = scenes.bar_with_handles()
+    other, _, others_moving = scenes.bar_with_handles("Other")
+    moving.location.z += 0.4
+    others_moving.location.z += 0.4
+    with bpy.context.temp_override(active_object=bar, selected_objects=[bar]):
+        assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}
+    assert bar.modifiers and not other.modifiers and bpy.context.view_layer.objects.active == other
+    scene = bpy.data.scenes.new("Second")
+    scene.collection.objects.link(other)
+    scene.view_layers[0].objects.active = other
+    scenes.activate(bar)
+    with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+        assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}
+    assert other.modifiers
+
+
 def test_several_objects_in_one_call_and_one_that_fails():
     bars = [scenes.bar_with_handles(name)[0] for name in ("One", "Two")]
     bare = scenes.bar("Bare")

@@ -131,6 +131,14 @@ def test_what_moves_with_the_armature_meanwhile_is_skinned():
     assert said[0].startswith("Rig: 5 bones move Body") and now != before
 
 
+def test_a_script_names_mesh_and_armature_by_an_override_of_the_context():
+    body, rig = person()
+    scenes.activate(scenes.bar())
+    with bpy.context.temp_override(active_object=rig, selected_objects=[body, rig]):
+        assert bpy.ops.arapfields.skin(scope="SELECTED", poses=8, samples=800) == {"FINISHED"}
+    assert body.vertex_groups and not bpy.context.object.vertex_groups
+
+
 @pytest.mark.parametrize("which", ["Body", "Rig"])
 def test_a_scale_that_flattens_is_named(which):
     scenes.activate(*person())
