@@ -25,12 +25,13 @@ def of(source):
     return [block for block in keys.key_blocks[1:] if block.name != NEUTRAL_KEY]
 
 
-def refusal(source):
+def refusal(source, target):
     """Why the keys of a source cannot be carried over, as a UserError; None where they can."""
-    if not source.data.shape_keys.use_relative:
-        return UserError(
-            "The shape keys of {name} are absolute; only relative ones can be transferred", source
-        )
+    for item in (source, target):
+        if item.data.shape_keys is not None and not item.data.shape_keys.use_relative:
+            return UserError(
+                "The shape keys of {name} are absolute; only relative ones can be transferred", item
+            )
     if not modifier_stack.keeps_vertices(source):
         return UserError(
             "Modifiers of {name} change its vertices; apply them, or leave out Shape Keys", source
@@ -83,7 +84,9 @@ def carry(source, target, displacements):
     if target.data.shape_keys is None:
         target.shape_key_add(name=basis.name, from_mix=False)
     points = {block: points_of(block) for block in given}
-    offsets = np.array([points[block] - points[block.relative_key] for block in blocks])
+    from_basis = {block for block in blocks if is_in_circle(block)}
+    starts = [basis if block in from_basis else block.relative_key for block in blocks]
+    offsets = np.array([points[block] - points[start] for block, start in zip(blocks, starts, strict=True)])
     carried = dict(zip(blocks, displacements(offsets), strict=True))
     made = {block: key_named(target, block.name) for block in blocks}
     made[basis] = target.data.shape_keys.reference_key
@@ -93,7 +96,8 @@ def carry(source, target, displacements):
     def shape_of(block):
         """Keys may be relative to others that are made here too."""
         if block not in shapes:
-            shapes[block] = shape_of(start_of[block]) + carried[block]
+            start = basis if block in from_basis else start_of[block]
+            shapes[block] = shape_of(start) + carried[block]
         return shapes[block]
 
     for block in blocks:
@@ -103,6 +107,15 @@ def carry(source, target, displacements):
         for name in ("slider_min", "slider_max", "value", "mute", "vertex_group", "interpolation"):
             setattr(key, name, getattr(block, name))
     return len(blocks)
+
+
+def is_in_circle(block):
+    """Whether a key is relative to itself, maybe by way of others."""
+    passed, start = set(), block.relative_key
+    while start not in passed and start != block:
+        passed.add(start)
+        start = start.relative_key
+    return start == block
 
 
 def points_of(block):

@@ -102,7 +102,7 @@ class Transfer:
         """Carries the kinds over; returns how many of each by label."""
         has_keys = "KEYS" in kinds and keys.of(self.source)
         if has_keys:
-            refuse(keys.refusal(self.source))
+            refuse(keys.refusal(self.source, self.target))
         single_user(self.target)
         steps = {
             "KEYS": self.keys,

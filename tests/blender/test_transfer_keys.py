@@ -109,3 +109,34 @@ def test_undo_and_a_wrap_at_rest_take_the_neutral_key_away():
     assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
     assert bpy.ops.arapfields.transfer() == {"FINISHED"}
     assert [(key.name, key.value) for key in target.data.shape_keys.key_blocks[1:]] == [("Up", 0.0)]
+
+
+def test_keys_that_are_relative_to_each_other_in_a_circle_are_carried():
+    item, target = bar_and_target()
+    item.shape_key_add(name="Basis")
+    one, other, own = (shifted(item, name, (0, 0, 0.2)) for name in ("One", "Other", "Own"))
+    one.relative_key, other.relative_key, own.relative_key = other, one, own
+    scenes.activate(item)
+    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+    scenes.activate(item)
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    keys = target.data.shape_keys.key_blocks
+    assert [key.relative_key.name for key in keys] == ["Basis", "Other", "One", "Own"]
+    for key in keys[1:]:
+        moved = mesh_arrays.vectors(key.data, "co") - mesh_arrays.vectors(keys[0].data, "co")
+        assert 0.1 < np.abs(moved).max() < 0.4
+
+
+def test_a_target_whose_keys_are_absolute_is_refused():
+    item, target = bar_and_target()
+    item.shape_key_add(name="Basis")
+    shifted(item, "Up", (0, 0, 0.2))
+    target.shape_key_add(name="Basis")
+    shifted(target, "Own", (0, 0, 0.2))
+    target.data.shape_keys.use_relative = False
+    scenes.activate(item)
+    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+    scenes.activate(item)
+    with pytest.raises(RuntimeError, match="The shape keys of Scan are absolute"):
+        bpy.ops.arapfields.transfer()
+    assert [key.name for key in target.data.shape_keys.key_blocks] == ["Basis", "Own"]
