@@ -25,6 +25,8 @@ class ARAPFIELDS_OT_add_obstacle(ObstacleOperator, bpy.types.Operator):
     def change(self, context, source):
         group = settings_of(source).contact
         others = [item for item in context.selected_objects if item != source and owner_of(item) != source]
+        if others and all(item.type != "MESH" for item in others):
+            raise UserError("{name} is no mesh; a mesh object is needed as an obstacle", others[0])
         known = {entry.item for entry in [*group.obstacle_list, *settings_of(source).carried]}
         for item in others or [None]:
             if item is None or (item.type == "MESH" and item not in known):

@@ -101,6 +101,9 @@ def test_what_cannot_be_an_obstacle_is_said():
     bar.arapfields.carried.add().item = block
     assert "carried" in str(contact.refusal(bar))
     bar.arapfields.carried.clear()
+    scenes.activate(lamp, bar)
+    with pytest.raises(RuntimeError, match="Lamp is no mesh; a mesh object is needed"):
+        bpy.ops.arapfields.add_obstacle()
     block.name = "Renamed"
     assert contact.obstacles_of(bar) == [(block, 0.0)]
     bpy.data.objects.remove(block)
