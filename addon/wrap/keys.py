@@ -91,7 +91,8 @@ def carry(source, target, displacements):
     made = {block: key_named(target, block.name) for block in blocks}
     made[basis] = target.data.shape_keys.reference_key
     start_of = {block: block.relative_key if block.relative_key in made else basis for block in blocks}
-    shapes = {basis: points_of(made[basis])}
+    locked = {block for block in blocks if made[block].lock_shape}
+    shapes = {block: points_of(made[block]) for block in (basis, *locked)}
 
     def shape_of(block):
         """Keys may be relative to others that are made here too."""
@@ -100,13 +101,13 @@ def carry(source, target, displacements):
             shapes[block] = shape_of(start) + carried[block]
         return shapes[block]
 
-    for block in blocks:
+    for block in [block for block in blocks if block not in locked]:
         key = made[block]
         mesh_arrays.put_vectors(key.data, shape_of(block), "co")
         key.relative_key = made[start_of[block]]
         for name in ("slider_min", "slider_max", "value", "mute", "vertex_group", "interpolation"):
             setattr(key, name, getattr(block, name))
-    return len(blocks)
+    return len(blocks) - len(locked)
 
 
 def is_in_circle(block):

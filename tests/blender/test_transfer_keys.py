@@ -140,3 +140,23 @@ def test_a_target_whose_keys_are_absolute_is_refused():
     with pytest.raises(RuntimeError, match="The shape keys of Scan are absolute"):
         bpy.ops.arapfields.transfer()
     assert [key.name for key in target.data.shape_keys.key_blocks] == ["Basis", "Own"]
+
+
+def test_a_locked_key_of_the_target_stays_as_it_was_sculpted():
+    item, target = bar_and_target()
+    item.shape_key_add(name="Basis")
+    shifted(item, "Up", (0, 0, 0.2))
+    above = shifted(item, "Above", (0, 0, 0.1))
+    above.relative_key = item.data.shape_keys.key_blocks["Up"]
+    scenes.activate(item)
+    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+    scenes.activate(item)
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    offset = offsets(target, "Above")
+    up = target.data.shape_keys.key_blocks["Up"]
+    sculpted = mesh_arrays.vectors(up.data, "co") + np.array([0, 0.5, 0])
+    mesh_arrays.put_vectors(up.data, sculpted, "co")
+    up.lock_shape = True
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    assert np.array_equal(mesh_arrays.vectors(up.data, "co"), sculpted.astype(np.float32))
+    assert np.abs(offsets(target, "Above") - offset).max() < SINGLE
