@@ -14,7 +14,7 @@ from ..results import placement, result_objects, visibility
 from ..solver import contact, frame_range, secondary_motion
 from ..solver.frame_solver import FrameSolver
 from ..solver.setup import sampled
-from ..solver.simulation import Simulation
+from ..solver.simulation import Poses, Simulation
 from ..solver.source_reader import SourceChanged, SourceReader, has_motion_before
 from . import loops
 from .caches import CacheFile, ShapeKeys, cache_beside, keys_weight, size_text
@@ -46,7 +46,7 @@ class ObjectBake:
     def __init__(self, context, source, kind, frames, path=None, part=None, loop=False):
         settings, fps = settings_of(source), secondary_motion.frame_rate(context.scene)
         self.in_place = placement.in_place(settings.output, settings.result) and path is not None
-        self.reader = SourceReader(context, source, kind, self.in_place)
+        self.poses, self.reader = Poses(), SourceReader(context, source, kind, self.in_place)
         if not self.in_place and settings.output == "WARP":  # live mode shows the pose at hand, a bake all
             self.reader.moves_by_itself = has_motion_before(source, in_place=False)
         self.frames, self.solver, self.error, self.obstacles = frames, None, None, contact.lasting(source)
@@ -105,7 +105,7 @@ class ObjectBake:
         if self.simulation is not None:
             shape = self.simulation.shape(self.solver, frame, request)
         elif is_baked:
-            shape = self.solver.solve_from_rest(request, task)
+            shape = self.poses.shape(self.solver, request, task)
         if is_baked:
             self.keep(shape)
 

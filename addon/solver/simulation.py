@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A source with secondary motion, frame by frame: each goes on from the whole frame before it.
+"""A source frame by frame; with secondary motion each goes on from the whole frame before it.
 
 At the start frame, and before it, the source is at rest where its handles are. Every frame after is one step
 from the last whole one, so that frames in between change nothing, and live mode and bakes make the same bits.
@@ -61,3 +61,14 @@ class Simulation:
         self.edition += 1
         for one in [one for one in list(self.moments) if one >= frame]:
             del self.moments[one]
+
+
+class Poses:
+    """Frames without secondary motion, each from rest: one in which nothing moves is that before it."""
+
+    last = None  # Shape
+
+    def shape(self, solver, request, task=None):
+        if self.last is None or not request.is_like(self.last.of):
+            self.last = solver.solve_from_rest(request, task)
+        return self.last

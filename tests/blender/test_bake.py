@@ -17,6 +17,7 @@ if IN_BLENDER:
     from addon.animation import caches
     from addon.core.runtime import jobs
     from addon.solver.frame_range import curves_of
+    from addon.solver.frame_solver import FrameSolver
 
 pytestmark = pytest.mark.in_blender
 
@@ -35,6 +36,26 @@ def test_animated_handles_are_baked_into_keys():
         heights.append(points[scenes.world_points(bar)[:, 0] > 0.9][:, 2].mean())
     assert abs(heights[0]) < 0.03 and abs(heights[2] - 0.4) < 0.05
     assert np.all(np.diff(heights) > 0.1)
+
+
+def test_frames_in_which_nothing_moves_are_solved_once():
+    animated()
+    solve, solved = FrameSolver.solve_from_rest, []
+
+    def counted(solver, request, task=None):
+        solved.append(request)
+        return solve(solver, request, task)
+
+    FrameSolver.solve_from_rest = counted
+    try:
+        bpy.ops.arapfields.bake(format="KEYS", start=-3, end=20)
+    finally:
+        FrameSolver.solve_from_rest = solve
+    baked = bpy.data.objects["Bar_baked"]
+    assert len(solved) == 5 and len(baked.data.shape_keys.key_blocks) == 25
+    shapes = [at(baked, frame) for frame in (-3, 1, 4, 5, 20)]
+    assert np.array_equal(shapes[0], shapes[1]) and np.array_equal(shapes[3], shapes[4])
+    assert np.abs(shapes[3] - shapes[2]).max() > 0.02
 
 
 def test_a_cancelled_bake_leaves_nothing():
