@@ -24,9 +24,11 @@ Vector inner_radii(PointsIn points, PointsIn normals, PointsIn witnesses, Points
       for (Index j = 0; j < witnesses.rows(); ++j) {
         const double a = witnesses(j, 0) - x[0], b = witnesses(j, 1) - x[1], c = witnesses(j, 2) - x[2];
         const double square = a * a + b * b + c * c, depth = -(a * n[0] + b * n[1] + c * n[2]);
+        const bool is_inside = 2.0 * depth > curvature * square, is_near = square <= near;
+        if (!is_inside && !is_near) continue;  // most of them
         if (!(depth > 0.0) || depth * depth < steep * square) continue;
-        if (2.0 * depth > curvature * square && square > 0.0) curvature = 2.0 * depth / square;
-        if (square > near) continue;
+        if (is_inside && square > 0.0) curvature = 2.0 * depth / square;
+        if (!is_near) continue;
         const Vec3 other = witness_normals.row(j);
         const double cosine = n.dot(other), gap = a * other[0] + b * other[1] + c * other[2];
         if (cosine < facing && gap > 0.0 && (1.0 - cosine) > curvature * gap)

@@ -62,7 +62,9 @@ LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::ve
       const double width = std::max(smooth_share * thickness[i], spacing_);
       double sum = 0.0, total = 0.0;
       for (Index j = 0; j < n; ++j) {
-        const double weight = 1.0 - (nodes_.row(j) - nodes_.row(i)).squaredNorm() / (width * width);
+        const double square = (nodes_.row(j) - nodes_.row(i)).squaredNorm();
+        if (square >= width * width) continue;
+        const double weight = 1.0 - square / (width * width);
         if (weight > 0.0) sum += weight * thickness[j], total += weight;
       }
       values_[i] = sum / total;
@@ -78,12 +80,12 @@ Vector LocalThickness::at(PointsIn points) const {
   const Index n = nodes_.rows();
   if (n == 0) return result;
   const double width = blend_spacings * spacing_;
+  const Eigen::ArrayX3d nodes = nodes_;  // by columns
   parallel_for(0, points.rows(), 64, [&](Index first, Index last) {
     Vector squares(n);
     for (Index i = first; i < last; ++i) {
-      squares.head(n).array() = (nodes_.col(0).array() - points(i, 0)).square() +
-                                (nodes_.col(1).array() - points(i, 1)).square() +
-                                (nodes_.col(2).array() - points(i, 2)).square();
+      squares.array() = (nodes.col(0) - points(i, 0)).square() + (nodes.col(1) - points(i, 1)).square() +
+                        (nodes.col(2) - points(i, 2)).square();
       const double nearest = squares.minCoeff(), farthest = nearest + width * width;
       double sum = 0.0, total = 0.0;
       for (Index j = 0; j < n; ++j)

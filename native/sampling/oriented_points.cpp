@@ -2,7 +2,6 @@
 #include "sampling/oriented_points.h"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <numeric>
 
@@ -12,8 +11,6 @@ namespace arapfields {
 namespace {
 
 constexpr Index leaf = 12, grain = 256;
-/// Subtrees that a search has still to visit: one a level, and each level halves the points.
-constexpr std::size_t most_levels = 64;
 
 }  // namespace
 
@@ -24,7 +21,9 @@ OrientedPoints::OrientedPoints(PointsIn points, PointsIn normals) : points_(poin
   for (Index count = points.rows(); count > leaf; count = (count + 1) / 2) nodes = 2 * nodes + 1;
   nodes_.resize(nodes);
   build(0, 0, points.rows());
+  places_.resize(rows_.size());
   for (std::size_t i = 0; i < rows_.size(); ++i) {
+    places_[rows_[i]] = static_cast<Index>(i);
     points_.row(i) = points.row(rows_[i]);
     normals_.row(i) = normals.row(rows_[i]);
   }
@@ -52,45 +51,26 @@ void OrientedPoints::build(std::size_t node, Index begin, Index end) {
   build(2 * node + 2, middle, end);
 }
 
-/// Calls visit(row of the tree) for all points that may lie within √square, which it may lower.
-template <class Visit>
-void OrientedPoints::search(const Vec3& place, double& square, Visit&& visit) const {
-  struct Pending {
-    std::size_t node;
-    double square;  // of the offset to its half space
-  };
-  std::array<Pending, most_levels> stack;
-  std::size_t pending = 0;
-  stack[pending++] = {0, 0.0};
-  while (pending > 0) {
-    Pending next = stack[--pending];
-    if (next.square > square) continue;
-    while (nodes_[next.node].axis >= 0) {
-      const Node& node = nodes_[next.node];
-      const double offset = place[node.axis] - node.split;
-      const std::size_t below = 2 * next.node + 1, above = below + 1;
-      stack[pending++] = {offset < 0.0 ? above : below, std::max(next.square, offset * offset)};
-      next.node = offset < 0.0 ? below : above;
-    }
-    for (Index i = nodes_[next.node].begin; i < nodes_[next.node].end; ++i) visit(i);
-  }
-}
-
-std::vector<Index> OrientedPoints::nearest(PointsIn others, PointsIn normals, double turn) const {
+std::vector<Index> OrientedPoints::nearest(PointsIn others, PointsIn normals, double turn,
+                                           const std::vector<Index>& guesses) const {
   std::vector<Index> result(others.rows());
+  const double turn_square = turn * turn;
   parallel_for(0, others.rows(), grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       const Vec3 place = others.row(i), normal = normals.row(i);
       double best = std::numeric_limits<double>::infinity();
       Index nearest_row = 0;
-      search(place, best, [&](Index k) {
-        const double square = (points_.row(k).transpose() - place).squaredNorm() +
-                              turn * turn * (normals_.row(k).transpose() - normal).squaredNorm();
+      const auto offer = [&](Index k) {
+        double square = (points_.row(k).transpose() - place).squaredNorm();
+        if (square > best) return;
+        square += turn_square * (normals_.row(k).transpose() - normal).squaredNorm();
         if (square < best || (square == best && rows_[k] < nearest_row)) {
           best = square;
           nearest_row = rows_[k];
         }
-      });
+      };
+      if (!guesses.empty()) offer(places_[guesses[i]]);
+      search(place, best, offer);
       result[i] = nearest_row;
     }
   });
@@ -99,10 +79,7 @@ std::vector<Index> OrientedPoints::nearest(PointsIn others, PointsIn normals, do
 
 std::vector<Index> OrientedPoints::within(const Vec3& place, double distance) const {
   std::vector<Index> result;
-  double square = distance * distance;
-  search(place, square, [&](Index k) {
-    if ((points_.row(k).transpose() - place).squaredNorm() <= square) result.push_back(rows_[k]);
-  });
+  visit_within(place, distance, [&](Index row, const Vec3&, const Vec3&) { result.push_back(row); });
   return result;
 }
 

@@ -52,13 +52,13 @@ class IterativeClosestPoints {
   /// The mean distance of pairs, including normals, and the placement after `rounds` rounds from `at`.
   std::pair<double, Similarity> improve(Similarity at, int rounds) const {
     double mean = 0.0;
+    std::vector<Index> target_of, source_of;
     for (int round = 0; round <= rounds; ++round) {
       // Closest points in both directions.
       const Points moved = at.of(points_), moved_normals = normals_ * at.rotation.transpose();
-      const std::vector<Index> target_of =
-          target_.tree.nearest(moved, moved_normals, normal_weight_ * at.scale);
+      target_of = target_.tree.nearest(moved, moved_normals, normal_weight_ * at.scale, target_of);
       const Points back_points = at.inverse_of(target_points_), back_normals = target_normals_ * at.rotation;
-      const std::vector<Index> source_of = tree_.nearest(back_points, back_normals, normal_weight_);
+      source_of = tree_.nearest(back_points, back_normals, normal_weight_, source_of);
 
       // Pairs, and landmarks among them.
       const Index n = moved.rows(), m = target_points_.rows(), k = source_.landmarks.rows();

@@ -16,16 +16,16 @@ constexpr double fit_ridge = 1e-4;
 
 /// Calls visit(row, u, v, h, weight) for the points about a place, in its tangent frame and in radii.
 template <class Visit>
-void visit_about(const OrientedPoints& surface, PointsIn points, PointsIn normals, const Vec3& place,
-                 const Vec3& normal, double radius, Visit&& visit) {
+void visit_about(const OrientedPoints& surface, const Vec3& place, const Vec3& normal, double radius,
+                 Visit&& visit) {
   const Vec3 first = normal.unitOrthogonal(), second = normal.cross(first);
-  for (const Index k : surface.within(place, reach * radius)) {
-    const double facing = normals.row(k).dot(normal);
-    if (!(facing > 0.0)) continue;
-    const Vec3 offset = (points.row(k).transpose() - place) / radius;
+  surface.visit_within(place, reach * radius, [&](Index k, const Vec3& point, const Vec3& point_normal) {
+    const double facing = point_normal.dot(normal);
+    if (!(facing > 0.0)) return;
+    const Vec3 offset = (point - place) / radius;
     visit(k, offset.dot(first), offset.dot(second), offset.dot(normal),
           facing * std::exp(-offset.squaredNorm()));
-  }
+  });
 }
 
 }  // namespace
@@ -41,11 +41,14 @@ RowMatrix<double> curvature_values(PointsIn points, PointsIn normals, PointsIn p
       Mat6 matrix = Mat6::Zero();
       Vec6 column = Vec6::Zero();
       double sum = 0.0;
-      visit_about(surface, points, normals, places.row(i), place_normals.row(i), radius,
+      visit_about(surface, places.row(i), place_normals.row(i), radius,
                   [&](Index /*row*/, double u, double v, double h, double weight) {
                     Vec6 terms;
                     terms << 1.0, u, v, u * u, u * v, v * v;
-                    matrix.noalias() += weight * terms * terms.transpose();
+                    const Vec6 weighted = weight * terms;  // its lower triangle, in blocks of two rows
+                    matrix.topLeftCorner<2, 2>() += weighted.head<2>() * terms.head<2>().transpose();
+                    matrix.block<2, 4>(2, 0) += weighted.segment<2>(2) * terms.head<4>().transpose();
+                    matrix.bottomRows<2>() += weighted.tail<2>() * terms.transpose();
                     column += weight * h * terms;
                     sum += weight;
                   });
@@ -72,7 +75,7 @@ SurfaceCurvature curvature_at(PointsIn points, PointsIn normals, PointsIn places
   parallel_for(0, places.rows(), 64, [&](Index begin, Index end) {
     for (Index i = begin; i < end && !progress.cancelled(); ++i) {
       Mat3 matrix = Mat3::Zero(), columns = Mat3::Zero();
-      visit_about(surface, points, normals, places.row(i), place_normals.row(i), near,
+      visit_about(surface, places.row(i), place_normals.row(i), near,
                   [&](Index k, double u, double v, double /*h*/, double weight) {
                     const Vec3 terms(1.0, u, v);
                     matrix.noalias() += weight * terms * terms.transpose();
