@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The verb wrap with --sequence: a template that follows a scanned motion."""
 
+import shutil
 from unittest.mock import Mock
 
 import numpy as np
@@ -16,25 +17,45 @@ from arapfields.cli import wrap_sequence
 SMALL = ["--centers", "50", "--stages", "2", "--iterations", "5", "--samples", "1000", "--quiet"]
 
 
-@pytest.fixture
-def motion(tmp_path):
-    """The call that wraps the template onto three frames, and their folder."""
-    frames = tmp_path / "frames"
-    frames.mkdir()
+FLAGS = ["--sequence", "--alignment", "none", *SMALL]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A folder with a template, three frames of its motion, and caches into which they were wrapped."""
+    folder = tmp_path_factory.mktemp("motion")
+    (folder / "frames").mkdir()
     v, f = cases.figure(2)
-    trimesh.Trimesh(v, f, process=False).export(tmp_path / "template.obj")
-    trimesh.Trimesh(v, f, process=False).export(tmp_path / "scan.ply")
+    trimesh.Trimesh(v, f, process=False).export(folder / "template.obj")
+    trimesh.Trimesh(v, f, process=False).export(folder / "scan.ply")
     for number in (10, 9, 11):  # by number, not by letter
         shape = cases.bend(v, 0.05 * (number - 9))
-        trimesh.Trimesh(shape, f, process=False).export(frames / f"scan{number}.ply")
-    flags = ["--sequence", "--alignment", "none", *SMALL]
-    return frames, lambda *given: run("wrap", tmp_path / "template.obj", *given, *flags)
+        trimesh.Trimesh(shape, f, process=False).export(folder / "frames" / f"scan{number}.ply")
+    for name in ("motion.pc2", "motion.mdd"):
+        assert run("wrap", folder / "template.obj", folder / "frames", "-o", folder / name, *FLAGS) == 0
+    return folder
 
 
-def test_frames_of_a_motion_go_into_a_point_cache(tmp_path, motion, capsys):
+@pytest.fixture
+def motion(tmp_path, whole):
+    """A copy of the frames, and the call that wraps the template onto them."""
+    frames = shutil.copytree(whole / "frames", tmp_path / "frames")
+    for name in ("template.obj", "scan.ply"):
+        shutil.copy(whole / name, tmp_path)
+    return frames, lambda *given: run("wrap", tmp_path / "template.obj", *given, *FLAGS)
+
+
+@pytest.fixture
+def wrapped(tmp_path, whole, motion):
+    """The same, and a copy of what wrapping them into motion.pc2 has left."""
+    shutil.copy(whole / "motion.pc2", tmp_path)
+    shutil.copytree(whole / ".motion.pc2.frames", tmp_path / ".motion.pc2.frames")
+    return motion
+
+
+def test_frames_of_a_motion_go_into_a_point_cache(tmp_path, motion, whole, capsys):
     (frames, wrap), cache, (v, f) = motion, tmp_path / "motion.pc2", cases.figure(2)
-    assert wrap(frames, "-o", cache) == 0
-    with af.PointCacheReader(cache) as reader:
+    with af.PointCacheReader(whole / "motion.pc2") as reader:
         found = [reader[k] for k in range(3)]
     for k in range(3):
         away = np.abs(af.MeshSdf(cases.bend(v, 0.05 * k), f)(found[k].astype(float)))
@@ -63,9 +84,10 @@ def wraps_counted(monkeypatch, stop_at=None):
     return wrapped
 
 
-def test_a_motion_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path, motion, monkeypatch, capsys):
-    (frames, wrap), whole, cache = motion, tmp_path / "whole.pc2", tmp_path / "motion.pc2"
-    assert wrap(frames, "-o", whole) == 0
+def test_a_motion_that_was_stopped_goes_on_as_if_it_had_not_been(
+    tmp_path, motion, whole, monkeypatch, capsys
+):
+    (frames, wrap), cache = motion, tmp_path / "motion.pc2"
     first = wraps_counted(monkeypatch, stop_at="scan11")
     assert wrap(frames, "-o", cache) != 0 and first == ["scan9", "scan10"] and not cache.exists()
     with monkeypatch.context() as elsewhere:
@@ -74,28 +96,35 @@ def test_a_motion_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path, motio
         assert wrap(frames, "-o", cache) == 2 and "another wrap is at work" in capsys.readouterr().err
     second = wraps_counted(monkeypatch)
     assert wrap(frames, "-o", cache, "--threads", "1") == 0 and second == ["scan11"]
-    assert cache.read_bytes() == whole.read_bytes()
+    assert cache.read_bytes() == (whole / "motion.pc2").read_bytes()
 
 
 @pytest.mark.parametrize(("edited", "redone"), [("scan11", 1), ("scan10", 2), ("scan9", 3)])
-def test_a_changed_frame_is_wrapped_again_with_those_behind_it(tmp_path, motion, edited, redone, monkeypatch):
-    (frames, wrap), cache, whole = motion, tmp_path / "motion.pc2", tmp_path / "whole.pc2"
-    assert wrap(frames, "-o", cache) == 0
+def test_a_changed_frame_is_wrapped_again_with_those_behind_it(
+    tmp_path, wrapped, edited, redone, monkeypatch
+):
+    (frames, wrap), cache, elsewhere = wrapped, tmp_path / "motion.pc2", tmp_path / "elsewhere.pc2"
     kept = tmp_path / ".motion.pc2.frames"
     count = len(list(kept.iterdir()))
     v, f = cases.figure(2)
     trimesh.Trimesh(cases.bend(v, -0.05), f, process=False).export(frames / f"{edited}.ply")
     anew = wraps_counted(monkeypatch)
     assert wrap(frames, "-o", cache) == 0 and anew == ["scan9", "scan10", "scan11"][-redone:]
-    assert wrap(frames, "-o", whole) == 0 and cache.read_bytes() == whole.read_bytes()
-    assert len(list(kept.iterdir())) == count  # no frame stays that the cache does not have
     anew.clear()
+    assert wrap(frames, "-o", elsewhere) == 0 and len(anew) == 3
+    assert cache.read_bytes() == elsewhere.read_bytes()
+    assert len(list(kept.iterdir())) == count  # no frame stays that the cache does not have
+
+
+def test_other_options_wrap_all_frames_anew(tmp_path, wrapped, monkeypatch):
+    (frames, wrap), cache = wrapped, tmp_path / "motion.pc2"
+    anew = wraps_counted(monkeypatch)
+    assert wrap(frames, "-o", cache) == 0 and not anew
     assert wrap(frames, "-o", cache, "--seed", "3") == 0 and len(anew) == 3
 
 
-def test_what_is_kept_of_a_motion_may_be_damaged(tmp_path, motion, monkeypatch):
-    (frames, wrap), cache = motion, tmp_path / "motion.pc2"
-    assert wrap(frames, "-o", cache) == 0
+def test_what_is_kept_of_a_motion_may_be_damaged(tmp_path, wrapped, monkeypatch):
+    (frames, wrap), cache = wrapped, tmp_path / "motion.pc2"
     before = cache.read_bytes()
     for path in (tmp_path / ".motion.pc2.frames").glob("[0-9]*"):
         path.write_bytes(path.read_bytes()[:-40])
@@ -104,7 +133,7 @@ def test_what_is_kept_of_a_motion_may_be_damaged(tmp_path, motion, monkeypatch):
 
 
 @pytest.mark.parametrize("bad", ["scan9", "scan10", "scan11"])
-def test_a_bad_frame_is_held_named_and_tried_again(tmp_path, motion, bad, monkeypatch, capsys):
+def test_a_bad_frame_is_held_named_and_tried_again(tmp_path, motion, whole, bad, monkeypatch, capsys):
     (frames, wrap), cache = motion, tmp_path / "motion.mdd"
     good = (frames / f"{bad}.ply").read_bytes()
     (frames / f"{bad}.ply").write_text("no mesh")
@@ -121,9 +150,7 @@ def test_a_bad_frame_is_held_named_and_tried_again(tmp_path, motion, bad, monkey
     (frames / f"{bad}.ply").write_bytes(good)
     assert wrap(frames, "-o", cache) == 0
     assert again == ["scan9", "scan10", "scan11"][held:]
-    anew = wraps_counted(monkeypatch)
-    assert wrap(frames, "-o", tmp_path / "whole.mdd") == 0 and len(anew) == 3
-    assert cache.read_bytes() == (tmp_path / "whole.mdd").read_bytes()
+    assert cache.read_bytes() == (whole / "motion.mdd").read_bytes()
 
 
 def test_a_motion_without_a_good_frame_is_refused(tmp_path, motion, capsys):

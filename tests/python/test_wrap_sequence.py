@@ -18,12 +18,12 @@ OFF = 0.005  # of the diagonal, on average from the surface without noise
 
 @pytest.fixture(scope="module")
 def played():
-    """Frames of a figure of which the nose bends, and the template's vertices in each."""
+    """Frames of a figure of which the nose bends, the template's vertices in each, and the fields."""
     v, f = cases.figure(3)
     diagonal = np.linalg.norm(np.ptp(v, axis=0))
     scanned, faces = cases.figure(4)
     rng = np.random.default_rng(0)
-    samples, true, found = af.sample_mesh(v, f, 2000), [], []
+    samples, true, fields = af.sample_mesh(v, f, 2000), [], []
     sequence = None
     for angle in np.append(np.linspace(0, 0.3, 5), [0.3, 0.15, 0.0]):
         true.append((bent(scanned, angle), faces))
@@ -31,8 +31,8 @@ def played():
         target = af.MeshSdf(noisy, faces)
         field = sequence.next(target) if sequence else af.wrap(samples, target, [], OPTIONS)
         sequence = sequence or af.WrapSequence(samples, field, OPTIONS)
-        found.append(field(v))
-    return v, diagonal, true, np.array(found), field, samples
+        fields.append(field)
+    return v, diagonal, true, np.array([field(v) for field in fields]), fields, samples
 
 
 def bent(points, angle):
@@ -63,18 +63,17 @@ def test_what_is_still_moves_less_than_the_noise(played):
 
 def test_rounding_moves_nothing(played):
     """In single precision it moved points by a tenth of the noise, in some frames by twice the noise."""
-    v, _, true, *_, samples = played
+    v, _, true, _, fields, samples = played
     shapes = []
     for moved in (0, ROUNDING):
         vertices, faces = true[1]
-        first = af.wrap(samples, af.MeshSdf(*true[0]), [], OPTIONS)
         target = af.MeshSdf(vertices + moved * np.sin(np.arange(vertices.size)).reshape(-1, 3), faces)
-        shapes.append(af.WrapSequence(samples, first, OPTIONS).next(target)(v))
+        shapes.append(af.WrapSequence(samples, fields[0], OPTIONS).next(target)(v))
     assert np.abs(shapes[1] - shapes[0]).max() < 1e3 * ROUNDING
 
 
 def test_a_frames_field_is_kept_in_a_file(played, tmp_path):
-    v, *_, found, field, _ = played
+    v, *_, found, (*_, field), _ = played
     field.save(tmp_path / "frame.safetensors")
     again = af.DeformationField.load(tmp_path / "frame.safetensors")
     assert np.abs(again(v) - found[-1]).max() < 1e-6
@@ -83,9 +82,8 @@ def test_a_frames_field_is_kept_in_a_file(played, tmp_path):
 
 def test_a_sequence_goes_on_from_a_frame_in_a_file(played, tmp_path):
     """To the last bit: a frame's field holds all that its sequence keeps."""
-    v, _, true, *_, samples = played
+    v, _, true, _, (first, *_), samples = played
     targets = [af.MeshSdf(*mesh) for mesh in true[1:4]]
-    first = af.wrap(samples, af.MeshSdf(*true[0]), [], OPTIONS)
     sequence = af.WrapSequence(samples, first, OPTIONS)
     sequence.next(targets[0]).save(tmp_path / "frame.safetensors")
     kept = af.DeformationField.load(tmp_path / "frame.safetensors")
@@ -103,7 +101,7 @@ def test_a_sequence_goes_on_from_a_frame_in_a_file(played, tmp_path):
 
 
 def test_what_is_no_first_frame_is_named(played):
-    v, *_, field, samples = played
+    v, *_, (*_, field), samples = played
     target = af.MeshSdf(*cases.figure(2))
     with pytest.raises(af.InvalidInput, match="samples"):
         af.WrapSequence(af.sample_mesh(2 * v, cases.figure(3)[1], 500), field)

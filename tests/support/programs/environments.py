@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 
-LEFT_OUT = ("CMAKE_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "VIRTUAL_ENV")
+LEFT_OUT = ("CMAKE_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "PYTHONPYCACHEPREFIX", "VIRTUAL_ENV")
 
 
 def run(*command, code=0, **keywords):
