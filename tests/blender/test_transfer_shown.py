@@ -26,6 +26,7 @@ def key_of(item, name, shape):
     if item.data.shape_keys is None:
         item.shape_key_add(name="Basis")
     block = item.shape_key_add(name=name, from_mix=False)
+    block.value = 0.0  # from Blender 5 on it is 1 at first
     mesh_arrays.put_vectors(block.data, shape(mesh_arrays.positions(item.data)), "co")
     return block
 
