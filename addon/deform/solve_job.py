@@ -69,7 +69,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
         if places:
             moves = similarity(before, after)
             after = transform(inverse(moves), after)
-            place = surface.space.solve_to_world @ moves @ surface.space.world_to_solve
+            place = surface.space.solve_to_world @ moves @ surface.space.local_to_solve
         turns = surface.turns(field, before, moves) if placement.keeps_mesh(output, result) else None
         changes = surface.splat_changes(field)[1] if surface.in_place else None
         moved = carrying.moved(native.library(), points, field, carried)
@@ -88,7 +88,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
             operator.gone = tuple(one for one in operator.gone if one[0].uid != surface.reference.uid)
         item = placement.place_result(bpy.context, owner, kind, output, result, solved, surface.local)
         if solved.place is not None:
-            placement.move(bpy.context, item, solved.place)
+            placement.put(bpy.context, item, solved.place)
         applying.solved[owner.session_uid] = pose
         carrying.put(bpy.context, solved.carried)
         operator.warnings += [about(owner.name, reason) for reason in carrying.take_warnings()]

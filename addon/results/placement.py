@@ -31,7 +31,7 @@ class SolvedMesh:
     turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
     changes: dict | None = None  # of splats' attributes
     carried: list = field(default_factory=list)  # what Carrying.moved made
-    place: np.ndarray | None = None  # (4, 4) world → world: how the object itself moves, if it does
+    place: np.ndarray | None = None  # (4, 4) local → world: where the object itself goes, if it does
 
 
 def destination(settings, operator):
@@ -120,9 +120,9 @@ def holds_place(source):
     return bool(bound or posed or moved or sheared)
 
 
-def move(context, item, place):
-    """Moves an object as a similarity, (4, 4) world → world, says."""
-    item.matrix_world = Matrix((place @ np.array(item.matrix_world)).tolist())
+def put(context, item, place):
+    """Puts an object where a matrix, (4, 4) local → world, says, wherever it was moved meanwhile."""
+    item.matrix_world = Matrix(place.tolist())
     context.view_layer.update()
 
 

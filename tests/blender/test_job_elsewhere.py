@@ -3,6 +3,7 @@
 
 import contextlib
 
+import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
 
@@ -11,10 +12,12 @@ if IN_BLENDER:
     from support.blender import scenes
     from support.blender.baking import saved_animation, stepped
     from support.blender.stages import Operator
+    from support.blender.wraps import SMALL, bar_and_target
 
     from addon.animation import played
     from addon.core.runtime import jobs
     from addon.deform.operators import ARAPFIELDS_OT_deform
+    from addon.wrap.operators import ARAPFIELDS_OT_wrap
 
 pytestmark = pytest.mark.in_blender
 
@@ -207,3 +210,23 @@ def test_an_obstacle_may_come_and_go_by_its_animation(kind):
         assert cube.hide_viewport == (frame == 1)
     running = bake()
     assert advanced(running) == {"FINISHED"} and path.exists(), running.said
+
+
+@pytest.mark.parametrize("result", ["MODIFIER", "NEW"])
+def test_a_wrap_whose_object_is_moved_meanwhile_lies_on_its_target(result):
+    """It was said to be near the target, and lay beside it."""
+    item, target = bar_and_target()
+    item.scale = (1, 1.2, 0.9)
+    bpy.context.view_layer.update()
+    scenes.activate(item)
+    running = begun(Operator(ARAPFIELDS_OT_wrap, onto="", result=result, **SMALL))
+    advanced(running, lambda: jobs.running() and jobs.running().items)
+    item.location, item.rotation_euler = (0, 0, 2), (0, 0, 1)
+    bpy.context.view_layer.update()
+    assert advanced(running) == {"FINISHED"}, running.said
+    shown = bpy.data.objects["Bar_wrapped"] if result == "NEW" else item
+    corners = [
+        np.array([points.min(axis=0), points.max(axis=0)])
+        for points in map(scenes.world_points, (shown, target))
+    ]
+    assert np.abs(corners[0] - corners[1]).max() < 0.1
