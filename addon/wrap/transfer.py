@@ -90,8 +90,11 @@ class Transfer:
         """UserError where most of the wrapped source and most of the target lie far from the other."""
         far = FAR * np.linalg.norm(np.ptp(self.own, axis=0))
         if self.distance(self.own) > far and distance(self.moved, (self.own, self.triangles)) > far:
-            text = "{name} does not lie on {target}; move it back, or wrap again"
-            raise UserError(text, self.source, target=self.target.name)
+            raise UserError(
+                "{name} does not lie on {target}; move it back, or wrap again",
+                self.source,
+                target=self.target.name,
+            )
 
     def places_of(self, vertices, triangles):
         """Where the vertices of a mesh lie on the wrapped source."""
