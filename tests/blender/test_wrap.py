@@ -117,6 +117,9 @@ def test_what_cannot_be_wrapped_onto_is_named_and_nothing_is_lost():
     item.arapfields.wrap.onto = empty
     with pytest.raises(RuntimeError, match="Nothing: the mesh is empty"):
         bpy.ops.arapfields.wrap(**SMALL)
+    empty.data.from_pydata([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [], [(0, 1, 2)])
+    with pytest.raises(RuntimeError, match="Nothing: its faces have no area"):
+        bpy.ops.arapfields.wrap(**SMALL)
     with pytest.raises(RuntimeError, match="no object Gone"):
         bpy.ops.arapfields.wrap(onto="Gone", **SMALL)
     with pytest.raises(RuntimeError, match="Bar is no other mesh object"):
