@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What every test may use: the folder of real data, and the helper modules beside this file."""
 
+import gc
 import os
 import signal
 from pathlib import Path
 
 import pytest
 
+gc.disable()  # until all tests are there: of what is imported nothing goes
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("ARAPFIELDS_DATA", ROOT.parent / "shared" / "data"))
 
@@ -34,6 +36,11 @@ def pytest_collection_modifyitems(config, items):
     """Folders with long files first: processes that take files one by one then end at about the same time."""
     items.sort(key=lambda item: LONG_FIRST.index(item.path.relative_to(ROOT / "tests").parts[0]))
     deselect_those_of_torch(config, items)
+
+
+def pytest_collection_finish():
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(autouse=True, scope="session")

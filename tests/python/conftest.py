@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shape that tests of wraps and of their landmarks share."""
+"""What several files share: the shape of wraps and of their landmarks, and saved fields."""
 
 import pytest
+from support.files import archives
 from support.geometry import wrap_cases as cases
 
 import arapfields as af
@@ -15,3 +16,9 @@ def figure():
 @pytest.fixture(scope="module")
 def samples(figure):
     return af.sample_mesh(*figure, 1500)
+
+
+@pytest.fixture(scope="session")
+def examples(tmp_path_factory):
+    """{kind: path} of saved fields and signed distances, for reading alone."""
+    return archives.make_examples(tmp_path_factory.mktemp("examples"))

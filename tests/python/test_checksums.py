@@ -10,11 +10,6 @@ import arapfields as af
 FLIPS = 60  # bits a kind of file
 
 
-@pytest.fixture(scope="module")
-def examples(tmp_path_factory):
-    return archives.make_examples(tmp_path_factory.mktemp("examples"))
-
-
 def test_each_flipped_bit_is_seen(examples, tmp_path):
     rng = np.random.default_rng(1)
     for name, path in examples.items():

@@ -14,11 +14,6 @@ from support.files import archives
 import arapfields as af
 
 
-@pytest.fixture(scope="module")
-def examples(tmp_path_factory):
-    return archives.make_examples(tmp_path_factory.mktemp("examples"))
-
-
 def refusal(path, content=None):
     """What the reader says of a file that it must refuse."""
     if content is not None:

@@ -31,11 +31,6 @@ from arapfields.grids import save_grid
 LIMIT = 1000  # bytes that a file may have where the disk is full
 
 
-@pytest.fixture(scope="module")
-def examples(tmp_path_factory):
-    return archives.make_examples(tmp_path_factory.mktemp("examples"))
-
-
 def names(folder):
     """Of files, less those by which Windows locks folders: they vanish with their process."""
     return sorted(path.name for path in folder.iterdir() if path.suffix != ".lock")
