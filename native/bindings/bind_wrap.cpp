@@ -65,8 +65,9 @@ py::array_t<double> suggest(const SurfaceSamples& samples, const FunctionArgumen
   return result;
 }
 
+/// `end`: the share of the task's progress that this is.
 Correspondence correspondence(const MovedArgument& field, const MeshArgument& source,
-                              const MeshArgument& target, bool back, Task* task) {
+                              const MeshArgument& target, bool back, Task* task, double end = 1.0) {
   const TriangleMesh rest = as_mesh_pair(source, "source"), onto = as_mesh_pair(target, "target");
   const bool by_field = py::isinstance<DeformationField>(field);
   const auto* given = by_field ? &field.cast<const DeformationField&>() : nullptr;
@@ -74,12 +75,13 @@ Correspondence correspondence(const MovedArgument& field, const MeshArgument& so
   return run_long(task, [&](const Progress& progress) {
     return Correspondence(given != nullptr ? WrappedMesh(rest, *given) : WrappedMesh(rest, moved), onto,
                           back ? Correspondence::Direction::to_source : Correspondence::Direction::to_target,
-                          progress);
+                          progress.part(0.0, end));
   });
 }
 
 /// Arrays whose vertices are one axis, as a matrix of a row a vertex, and back.
-py::array_t<double> carried(const Correspondence& self, const ArrayArgument& argument, bool displacements) {
+py::array_t<double> carried(const Correspondence& self, const ArrayArgument& argument, bool displacements,
+                            Task* task = nullptr, double begin = 0.0) {
   const std::string name = displacements ? "displacements" : "values";
   const py::array_t<double> given = as_doubles(argument, name);
   std::vector<py::ssize_t> shape(given.shape(), given.shape() + given.ndim());
@@ -94,13 +96,16 @@ py::array_t<double> carried(const Correspondence& self, const ArrayArgument& arg
   shape[axis] = self.places().shares.rows();
   py::array_t<double> result(shape);
   double* out = result.mutable_data();
-  run_long([&] {
+  run_long(task, [&](const Progress& whole) {
+    const Progress progress = whole.part(begin, 1.0);
     for (Index k = 0; k < keys; ++k) {
+      progress.report(static_cast<double>(k) / static_cast<double>(keys), "carrying");
       const Eigen::Map<const RowMatrix<double>> part(given.data() + k * rows * columns, rows, columns);
       const RowMatrix<double> moved =
-          displacements ? RowMatrix<double>(self.displacements(part)) : self.values(part);
+          displacements ? RowMatrix<double>(self.displacements(part, progress)) : self.values(part);
       out = std::copy(moved.data(), moved.data() + moved.size(), out);
     }
+    progress.report(1.0, "carrying");
   });
   return result;
 }
@@ -110,12 +115,14 @@ TransferResult transfer(const MovedArgument& field, const MeshArgument& source, 
   const std::string allowed = "a dict of \"values\" and \"displacements\" is needed";
   require(py::isinstance<py::dict>(what), "what", "got " + type_text(what), allowed);
   py::dict result;
+  constexpr double found = 0.3;  // of the progress
   std::optional<Correspondence> places;
   for (const auto& [key, array] : py::reinterpret_borrow<py::dict>(what)) {
     const std::string name = as_text(key, "what");
     require(name == "values" || name == "displacements", "what", "unknown key " + name, allowed);
-    if (!places) places.emplace(correspondence(field, source, target, back, task));
-    result[key] = carried(*places, py::reinterpret_borrow<ArrayArgument>(array), name == "displacements");
+    if (!places) places.emplace(correspondence(field, source, target, back, task, found));
+    result[key] =
+        carried(*places, py::reinterpret_borrow<ArrayArgument>(array), name == "displacements", task, found);
   }
   return TransferResult(result);
 }
@@ -126,8 +133,9 @@ Which place of one mesh belongs to each vertex of another, after a wrap of a sou
 
 The places are the nearest ones of the wrapped source, on the side that faces the same way. Build one for any
 number of arrays; `transfer` is the same for one use.)")
-      .def(py::init(&correspondence), "field"_a, "source"_a, "target"_a, py::kw_only(), "back"_a = false,
-           "task"_a = py::none(), R"(
+      .def(py::init([](const MovedArgument& field, const MeshArgument& source, const MeshArgument& target,
+                       bool back, Task* task) { return correspondence(field, source, target, back, task); }),
+           "field"_a, "source"_a, "target"_a, py::kw_only(), "back"_a = false, "task"_a = py::none(), R"(
 field: the DeformationField of `wrap`, or the source's vertices as another tool wrapped them, (n, 3). source
 and target: pairs (vertices, triangles). Gives to the target's vertices, with back=True to the source's.
 
@@ -152,13 +160,13 @@ Raises InvalidInput and Cancelled.)")
           "values"_a, "Values (n, …) of the giving vertices, interpolated linearly: (m, …).")
       .def(
           "displacements",
-          [](const Correspondence& self, const ArrayArgument& offsets) {
-            return carried(self, offsets, true);
+          [](const Correspondence& self, const ArrayArgument& offsets, Task* task) {
+            return carried(self, offsets, true, task);
           },
-          "displacements"_a, R"(
+          "displacements"_a, py::kw_only(), "task"_a = py::none(), R"(
 Displacements (n, 3) or (k, n, 3), as of shape keys: (…, m, 3), carried by the smoothest map of space that takes
 the source's surface to where it was moved. No triangle folds which does not fold there.
-Source: Duchon 1977; Sumner and Popović 2004.)");
+Raises InvalidInput and Cancelled. Source: Duchon 1977; Sumner and Popović 2004.)");
   module.def("transfer", &transfer, "field"_a, "source"_a, "target"_a, "what"_a, py::kw_only(),
              "back"_a = false, "task"_a = py::none(), R"(
 Carries what a mesh has over to the mesh that it was wrapped onto, or back.

@@ -132,14 +132,14 @@ std::vector<Mat3> CarriedMotion::gradients(PointsIn given) const {
   return result;
 }
 
-Points CarriedMotion::operator()(PointsIn given) const {
+Points CarriedMotion::operator()(PointsIn given, const Progress& progress) const {
   const Index count = anchors_.size();
   const std::vector<Mat3> slopes = gradients(given);
   Points at_place(count, 3);
   for (Index v = 0; v < count; ++v)
     at_place.row(v) =
         places_.interpolated(giving_.triangles, first_[v], [&](Index g) { return given.row(g); });
-  const Points mapped = map_(at_place);
+  const Points mapped = map_(at_place, progress);
   const Eigen::MatrixX3d anchored = anchors_.asDiagonal() * mapped;
   Points differences(static_cast<Index>(edges_.size()), 3);
   for (std::size_t k = 0; k < edges_.size(); ++k) {
@@ -169,6 +169,7 @@ Points CarriedMotion::operator()(PointsIn given) const {
       right.row(edges_[k].begin) += moved;
       right.row(edges_[k].end) -= moved;
     }
+    progress.check();
     result = factor_.solve(right);
     if (round == most_rounds || !spare_folds(given, result, kept)) break;
   }

@@ -23,8 +23,8 @@ class CarriedMotion {
   CarriedMotion(const TriangleMesh& giving, const TriangleMesh& receiving, const SurfacePlaces& places,
                 DisplacementMap map, const Progress& progress = {});
 
-  /// Displacements (m,3) of the giving vertices: (n,3) of the receiving ones.
-  Points operator()(PointsIn given) const;
+  /// Displacements (m,3) of the giving vertices: (n,3) of the receiving ones. Throws Cancelled.
+  Points operator()(PointsIn given, const Progress& progress = {}) const;
 
  private:
   struct Edge {

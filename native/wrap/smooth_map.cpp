@@ -119,31 +119,33 @@ SmoothMap surface_map(const TriangleMesh& from, PointsIn to, const Progress& pro
 }
 
 template <class Visit>
-void SmoothMap::visit(PointsIn points, Visit&& visit) const {
+void SmoothMap::visit(PointsIn points, const Progress& progress, Visit&& visit) const {
   const Points x = in_units(points);
   parallel_for(0, x.rows(), 64, [&](Index begin, Index end) {
     Columns ways(centers_.rows(), 3);
     Eigen::ArrayXd distances(centers_.rows());
+    if (progress.cancelled()) return;
     for (Index i = begin; i < end; ++i) {
       ways = -(centers_.rowwise() - x.row(i).array());
       distances = ways.square().rowwise().sum().sqrt();
       visit(i, x.row(i), ways, distances);
     }
   });
+  progress.check();
 }
 
-Points SmoothMap::at(PointsIn points) const {
+Points SmoothMap::at(PointsIn points, const Progress& progress) const {
   Points result(points.rows(), 3);
-  visit(points, [&](Index i, const auto& x, const auto& /*ways*/, const auto& distances) {
+  visit(points, progress, [&](Index i, const auto& x, const auto& /*ways*/, const auto& distances) {
     result.row(i) = affine_.row(0) + x * affine_.bottomRows<3>() +
                     distances.cube().matrix().transpose() * weights_.matrix();
   });
   return result;
 }
 
-std::vector<Mat3> SmoothMap::jacobians(PointsIn points) const {
+std::vector<Mat3> SmoothMap::jacobians(PointsIn points, const Progress& progress) const {
   std::vector<Mat3> result(points.rows());
-  visit(points, [&](Index i, const auto& /*x*/, const auto& ways, const auto& distances) {
+  visit(points, progress, [&](Index i, const auto& /*x*/, const auto& ways, const auto& distances) {
     const Columns slopes = ways.colwise() * (3.0 * distances);
     result[i] =
         (affine_.bottomRows<3>().transpose() + weights_.matrix().transpose() * slopes.matrix()) / size_;
@@ -152,12 +154,12 @@ std::vector<Mat3> SmoothMap::jacobians(PointsIn points) const {
 }
 
 DisplacementMap::DisplacementMap(SmoothMap map, PointsIn points, PointsIn images, std::vector<Mat3> jacobians,
-                                 bool back)
+                                 bool back, const Progress& progress)
     : map_(std::move(map)),
       points_(points),
-      at_points_(map_.at(points)),
+      at_points_(map_.at(points, progress)),
       jacobians_(std::move(jacobians)),
-      map_jacobians_(map_.jacobians(points)),
+      map_jacobians_(map_.jacobians(points, progress)),
       trust_(points.rows()),
       back_(back) {
   const double far = missed_share * std::max(diagonal_of(images), 1e-300);
@@ -172,8 +174,9 @@ DisplacementMap::DisplacementMap(SmoothMap map, PointsIn points, PointsIn images
 }
 
 /// Of some points, with a displacement each.
-Points DisplacementMap::beyond_linear(const std::vector<Index>& rows, PointsIn displacements) const {
-  const Points there = map_.at(rows_of(points_, rows) + displacements);
+Points DisplacementMap::beyond_linear(const std::vector<Index>& rows, PointsIn displacements,
+                                      const Progress& progress) const {
+  const Points there = map_.at(rows_of(points_, rows) + displacements, progress);
   Points result(displacements.rows(), 3);
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const Index i = rows[k];
@@ -185,7 +188,7 @@ Points DisplacementMap::beyond_linear(const std::vector<Index>& rows, PointsIn d
   return result;
 }
 
-Points DisplacementMap::operator()(PointsIn displacements) const {
+Points DisplacementMap::operator()(PointsIn displacements, const Progress& progress) const {
   std::vector<Index> rows;
   for (Index i = 0; i < displacements.rows(); ++i)
     if (!displacements.row(i).isZero(0.0)) rows.push_back(i);
@@ -197,8 +200,8 @@ Points DisplacementMap::operator()(PointsIn displacements) const {
   };
   const Points given = rows_of(displacements, rows);
   Points moved = linear(given);
-  if (!back_) moved += beyond_linear(rows, given);
-  for (int k = 0; back_ && k < back_steps; ++k) moved = linear(given - beyond_linear(rows, moved));
+  if (!back_) moved += beyond_linear(rows, given, progress);
+  for (int k = 0; back_ && k < back_steps; ++k) moved = linear(given - beyond_linear(rows, moved, progress));
   Points result = Points::Zero(displacements.rows(), 3);
   for (std::size_t k = 0; k < rows.size(); ++k) result.row(rows[k]) = moved.row(k);
   return result;

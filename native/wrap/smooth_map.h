@@ -13,15 +13,16 @@ namespace arapfields {
 /// f(x) = A x + b + Σ w_i |x − c_i|³.
 class ARAPFIELDS_EXPORT_TO_TESTS SmoothMap {
  public:
-  Points at(PointsIn points) const;
-  std::vector<Mat3> jacobians(PointsIn points) const;
+  /// Throw Cancelled.
+  Points at(PointsIn points, const Progress& progress = {}) const;
+  std::vector<Mat3> jacobians(PointsIn points, const Progress& progress = {}) const;
 
  private:
   friend class SmoothingSpline;
   using Columns = Eigen::Array<double, Eigen::Dynamic, 3>;
   /// Calls visit(row, x, ways, distances) for each point: in units, and from the centers.
   template <class Visit>
-  void visit(PointsIn points, Visit&& visit) const;
+  void visit(PointsIn points, const Progress& progress, Visit&& visit) const;
   Points in_units(PointsIn points) const { return (points.rowwise() - center_) / size_; }
 
   Eigen::RowVector3d center_;
@@ -58,19 +59,21 @@ ARAPFIELDS_EXPORT_TO_TESTS SmoothMap surface_map(const TriangleMesh& from, Point
 /// a point's own image, as where lips part, the Jacobians that are given count instead.
 class ARAPFIELDS_EXPORT_TO_TESTS DisplacementMap {
  public:
+  /// Throws Cancelled.
   DisplacementMap(SmoothMap map, PointsIn points, PointsIn images, std::vector<Mat3> jacobians,
-                  bool back = false);
+                  bool back = false, const Progress& progress = {});
 
   /// In the direction of the displacements.
   const std::vector<Mat3>& jacobians() const { return jacobians_; }
   /// From 0 to 1 (n): how much the map counts.
   const Vector& trust() const { return trust_; }
   /// J δ, and what f(x + δ) − f(x) has beyond that; of far displacements a part. Back: the δ of which that
-  /// is.
-  Points operator()(PointsIn displacements) const;
+  /// is. Throws Cancelled.
+  Points operator()(PointsIn displacements, const Progress& progress = {}) const;
 
  private:
-  Points beyond_linear(const std::vector<Index>& rows, PointsIn displacements) const;
+  Points beyond_linear(const std::vector<Index>& rows, PointsIn displacements,
+                       const Progress& progress) const;
 
   SmoothMap map_;
   Points points_;

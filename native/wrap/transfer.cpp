@@ -93,16 +93,22 @@ RowMatrix<double> values_at(const SurfacePlaces& places, const Triangles& triang
 }
 
 /// At the receiving vertices: on the way there these are at places on the source.
-DisplacementMap displacement_map(const WrappedMesh& source, const SurfacePlaces& places, bool back) {
-  SmoothMap map = surface_map(source.rest, source.moved.vertices);
-  if (back) return {std::move(map), source.rest.vertices, source.moved.vertices, source.jacobians, back};
+DisplacementMap displacement_map(const WrappedMesh& source, const SurfacePlaces& places, bool back,
+                                 const Progress& progress) {
+  SmoothMap map = surface_map(source.rest, source.moved.vertices, progress);
+  if (back)
+    return {std::move(map), source.rest.vertices, source.moved.vertices, source.jacobians, back, progress};
   const Triangles& triangles = source.rest.triangles;
   std::vector<Mat3> jacobians(places.shares.rows());
   for (Index i = 0; i < places.shares.rows(); ++i)
     jacobians[i] =
         places.interpolated(triangles, i, [&](Index v) -> const Mat3& { return source.jacobians[v]; });
-  return {std::move(map), Points(values_at(places, triangles, source.rest.vertices)),
-          Points(values_at(places, triangles, source.moved.vertices)), std::move(jacobians)};
+  return {std::move(map),
+          Points(values_at(places, triangles, source.rest.vertices)),
+          Points(values_at(places, triangles, source.moved.vertices)),
+          std::move(jacobians),
+          back,
+          progress};
 }
 
 Points moved_by(const DeformationField& field, const TriangleMesh& mesh) {
@@ -221,7 +227,7 @@ RowMatrix<double> Correspondence::values(const RowMatrix<double>& given) const {
   return values_at(places_, giving_.triangles, given);
 }
 
-Points Correspondence::displacements(PointsIn given) const {
+Points Correspondence::displacements(PointsIn given, const Progress& progress) const {
   require(given.rows() == giving(), "displacements", std::to_string(given.rows()) + " rows",
           "one for each of " + std::to_string(giving()) + " vertices is needed");
   {
@@ -229,9 +235,9 @@ Points Correspondence::displacements(PointsIn given) const {
     Motion& motion = *motion_;
     if (!motion.carried)
       motion.carried.emplace(giving_, receiving_, places_,
-                             displacement_map(motion.source, places_, motion.back));
+                             displacement_map(motion.source, places_, motion.back, progress), progress);
   }
-  return (*motion_->carried)(given);
+  return (*motion_->carried)(given, progress);
 }
 
 }  // namespace arapfields

@@ -41,8 +41,8 @@ class ARAPFIELDS_EXPORT Correspondence {
   /// Values (n,k) of the giving vertices, interpolated linearly: (m,k) of the receiving ones.
   RowMatrix<double> values(const RowMatrix<double>& given) const;
   /// Displacements (n,3), as of a shape key, carried as SmoothMap and CarriedMotion say. The first call
-  /// prepares the others; any thread may call.
-  Points displacements(PointsIn given) const;
+  /// prepares the others; any thread may call. Throws Cancelled.
+  Points displacements(PointsIn given, const Progress& progress = {}) const;
 
  private:
   struct Motion;

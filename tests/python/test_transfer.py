@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What one mesh has, carried over to another that it was wrapped onto, and back."""
 
+import threading
+import time
+
 import numpy as np
 import pytest
 from support.geometry import wrap_cases as cases
@@ -188,3 +191,36 @@ def vertex_normals(vertices, triangles):
     ]
     normals = np.stack(sums[:3], axis=1)
     return normals / np.linalg.norm(normals, axis=1, keepdims=True), sums[3]
+
+
+def test_a_cancel_does_not_wait_for_the_keys(figure):
+    """Neither for those to come, nor for what the first of them prepares."""
+    v, f = figure
+    moved = 2.0 * v @ TURN.T
+    for places in (af.Correspondence(moved, (v, f), (moved, f)), None):
+        task = af.Task()
+        task.cancel()
+        with pytest.raises(af.Cancelled):
+            if places:
+                places.displacements(np.zeros((3, len(v), 3)), task=task)
+            else:
+                af.transfer(moved, (v, f), (moved, f), {"displacements": v}, task=task)
+    places = af.Correspondence(moved, (v, f), (moved, f))
+    whole, task = af.Task(), af.Task()
+    keys = np.stack([v] * 20)
+    carried = places.displacements(keys, task=whole)  # prepares what the next call has at hand
+    assert whole.progress == 1.0
+    results = []
+
+    def carry():
+        with pytest.raises(af.Cancelled):
+            results.append(places.displacements(keys, task=task))
+
+    thread = threading.Thread(target=carry)
+    thread.start()
+    while not task.progress:
+        time.sleep(1e-4)
+    task.cancel()
+    thread.join()
+    assert task.progress < 0.5 and not results
+    assert np.array_equal(places.displacements(keys[:1])[0], carried[0])  # nothing is left half-done
