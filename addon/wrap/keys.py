@@ -75,19 +75,26 @@ def shape_at(context, item, kept, values):
         bpy.data.meshes.remove(mesh)
 
 
+def offsets(source):
+    """(k, n, 3) of the keys, each from where it starts."""
+    if not of(source):
+        return np.empty((0, len(source.data.vertices), 3))
+    points = {block: points_of(block) for block in source.data.shape_keys.key_blocks}
+    basis, blocks = source.data.shape_keys.reference_key, of(source)
+    starts = [basis if is_in_circle(block) else block.relative_key for block in blocks]
+    return np.array([points[block] - points[start] for block, start in zip(blocks, starts, strict=True)])
+
+
 def carry(source, target, displacements):
-    """Carries the keys over by what makes the target's displacements of the source's; returns how many."""
+    """Gives the target keys of these displacements (k, m, 3), as the source has; returns how many."""
     blocks = of(source)
     if not blocks:
         return 0
-    given, basis = source.data.shape_keys.key_blocks, source.data.shape_keys.reference_key
+    basis = source.data.shape_keys.reference_key
     if target.data.shape_keys is None:
         target.shape_key_add(name=basis.name, from_mix=False)
-    points = {block: points_of(block) for block in given}
     from_basis = {block for block in blocks if is_in_circle(block)}
-    starts = [basis if block in from_basis else block.relative_key for block in blocks]
-    offsets = np.array([points[block] - points[start] for block, start in zip(blocks, starts, strict=True)])
-    carried = dict(zip(blocks, displacements(offsets), strict=True))
+    carried = dict(zip(blocks, displacements, strict=True))
     made = {block: key_named(target, block.name) for block in blocks}
     made[basis] = target.data.shape_keys.reference_key
     start_of = {block: block.relative_key if block.relative_key in made else basis for block in blocks}

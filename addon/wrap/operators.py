@@ -13,18 +13,21 @@ from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_value, effective_values, integer, text
 from ..blender.source_operator import SourceOperator
 from ..carried import hanging, rest_bones
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.geometry.handles import nothing_held
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
+from ..core.runtime.jobs import Item
 from ..core.settings.parameters import WRAP
 from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..field_modifier import layers
 from ..handles import empties
 from ..handles.following import Followers
+from ..jobs.job_operator import JobOperator
 from ..properties.choices import result_properties
 from ..results.placement import holds_place
 from . import keys, landmarks, transfer
+from .matching import Match
 from .properties import carried_kinds, fit_rig, move_object
 
 onto = text(
@@ -189,26 +192,34 @@ class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
         hanging.follow(context, source, shapes, lambda: rest_bones.reset(context, source))
 
 
-class ARAPFIELDS_OT_transfer(SourceOperator, bpy.types.Operator):
+class ARAPFIELDS_OT_transfer(JobOperator, bpy.types.Operator):
     """Give the target what the wrapped object has: shape keys, weights, attributes, seams, its armature"""
 
     bl_label = "Transfer to Target"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"UNDO"}
+    title = "Transfer to Target"
     guide = "wrap"
-    of_linked = True
 
-    __annotations__ = {"onto": onto, "transfer": carried_kinds(options=("SKIP_SAVE",))}
+    __annotations__ = {"onto": onto, "transfer": carried_kinds(options={"SKIP_SAVE"})}
 
     @classmethod
     def refuses(cls, source):
         return (landmarks.refusal(source) if has_window() else None) or transfer.not_wrapped(source)
 
-    def change(self, context, source):
+    def plan(self, context, source, weights):
         target = landmarks.target_of(source, self.onto)
         kinds = effective_value("transfer", settings_of(source).wrap, self)
+        has_keys = "KEYS" in kinds and bool(keys.of(source))
+        refuse(transfer.refusal(source, target) or (keys.refusal(source, target) if has_keys else None))
         layers.uncover(source)
-        work = transfer.Transfer(context, source, target)
-        return transfer.message(target, work.carry(kinds), work.notes)
+        match = Match(context, source, target, has_keys)
+
+        def apply(_):
+            work = transfer.Transfer(bpy.context, *match.get(), match)
+            done = work.carry(kinds)
+            return transfer.message(work.target, done, work.notes)
+
+        return Item(source.name, match.find, apply, edits=match.ends)
 
 
 CLASSES = [

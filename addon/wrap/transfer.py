@@ -7,22 +7,14 @@ from mathutils.kdtree import KDTree
 from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.language import translated
 from ..blender.object_references import settings_of
-from ..core.errors import UserError, refuse
+from ..core.errors import UserError
 from ..core.geometry import uv_transfer
 from ..core.geometry.edge_paths import carried_marks
-from ..core.geometry.spaces import transform
-from ..core.runtime import native
 from ..core.settings.choices import TRANSFERRED
-from ..handles.empties import matrix_of
-from ..names import NEUTRAL_KEY
 from ..results.placement import single_user
 from . import garments, keys, rigs
-from .given import Given
 
 LEAST_WEIGHT = 1e-4  # what is below is no member of a group
-LEAST_POSE = 1e-5  # of the target's size: an armature at rest moves by less, by rounding
-FAR = 0.05  # of the target's diagonal: a wrap leaves half of the vertices nearer than that
-LOOKED_AT = 1000  # vertices at most, to see how far two surfaces are apart
 
 
 def not_wrapped(source):
@@ -45,67 +37,16 @@ def refusal(source, target):
     return mesh_arrays.nothing_in(target.name, len(target.data.vertices), len(target.data.polygons))
 
 
-def keeps_vertices(modifier):
-    return modifier.type in modifier_stack.KEEPING or modifier_stack.is_field(modifier)
-
-
-def distance(points, mesh):
-    """How far from the surface of a mesh, its vertices and triangles, half of the points are at most."""
-    surface = native.library().MeshSdf(*mesh)
-    return np.median(np.abs(surface(points[:: -(-len(points) // LOOKED_AT)])))
-
-
 class Transfer:
-    """One source and one target: what is carried goes from the first's wrapped mesh to the second's own."""
+    """What is carried goes from the first's wrapped mesh to the second's own, as a Match has found it."""
 
-    def __init__(self, context, source, target):
-        refuse(refusal(source, target))
-        self.context, self.source, self.target = context, source, target
-        self.given = Given(context, source)
-        to_target = np.linalg.inv(matrix_of(target)) @ matrix_of(source)
-        self.moved = transform(to_target, self.given.moved)  # in the target's coordinates, as keys are
-        self.triangles, self.notes = mesh_arrays.triangles(target.data), []
-        self.unposed = self.seen(is_posed=False)
-        self.own = min((self.unposed, self.seen(is_posed=True)), key=self.distance)
-        self.refuse_elsewhere()
-        self.places = self.places_of(self.own, self.triangles)
-
-    def seen(self, is_posed):
-        """(n, 3) vertices of the target as a wrap sees them, by its own keys, and by its modifiers or not."""
-        target, blocks = self.target, self.target.data.shape_keys
-        own = mesh_arrays.positions(target.data)
-        kept = [one for one in target.modifiers if is_posed and one.show_viewport and keeps_vertices(one)]
-        if not kept and blocks is None:
-            return own
-        given = {NEUTRAL_KEY, *(block.name for block in keys.of(self.source))}  # the wrap was without these
-        values = dict.fromkeys(given & set(blocks.key_blocks.keys() if blocks else ()), 0.0)
-        shape = keys.shape_at(self.context, target, kept, values)
-        return shape if len(shape) == len(own) else own
-
-    def distance(self, vertices):
-        """How far from the wrapped source these are: a pose may have come after the wrap."""
-        return distance(vertices, (self.moved, self.given.triangles))
-
-    def refuse_elsewhere(self):
-        """UserError where most of the wrapped source and most of the target lie far from the other."""
-        far = FAR * np.linalg.norm(np.ptp(self.own, axis=0))
-        if self.distance(self.own) > far and distance(self.moved, (self.own, self.triangles)) > far:
-            raise UserError(
-                "{name} does not lie on {target}; move it back, or wrap again",
-                self.source,
-                target=self.target.name,
-            )
-
-    def places_of(self, vertices, triangles):
-        """Where the vertices of a mesh lie on the wrapped source."""
-        rest = self.given.rest, self.given.triangles
-        return native.library().Correspondence(self.moved, rest, (vertices, triangles))
+    def __init__(self, context, source, target, match):
+        self.context, self.source, self.target, self.match = context, source, target, match
+        self.given, self.moved, self.own, self.places = match.given, match.moved, match.own, match.places
+        self.notes = []
 
     def carry(self, kinds):
         """Carries the kinds over; returns how many of each by label."""
-        has_keys = "KEYS" in kinds and keys.of(self.source)
-        if has_keys:
-            refuse(keys.refusal(self.source, self.target))
         single_user(self.target)
         steps = {
             "KEYS": self.keys,
@@ -117,21 +58,14 @@ class Transfer:
             "CARRIED": self.carried,
         }
         done = {label: steps[kind]() for kind, label, _ in TRANSFERRED if kind in kinds}
-        if has_keys:
+        if self.match.displacements is not None:
             keys.take_back(self.source, self.target)
             rigs.copy_drivers(self.source, self.target)
         return done
 
     def keys(self):
-        return keys.carry(self.source, self.target, self.displacements)
-
-    def displacements(self, offsets):
-        """Those of the target's keys, by (k, n, 3) of the source's: what poses the target poses these too."""
-        carried = self.places.displacements(offsets)
-        if np.abs(self.own - self.unposed).max() <= LEAST_POSE * np.ptp(self.own, axis=0).max():
-            return carried
-        seen, unposed = (self.own, self.triangles), (self.unposed, self.triangles)
-        return native.library().Correspondence(self.unposed, seen, unposed).displacements(carried)
+        displacements = self.match.displacements
+        return 0 if displacements is None else keys.carry(self.source, self.target, displacements)
 
     def groups(self):
         done = 0
@@ -181,7 +115,7 @@ class Transfer:
         mesh.polygons.foreach_get("loop_start", starts)
         corners = mesh_arrays.corner_vertices(mesh)
         points, triangles, face = uv_transfer.fan(self.own, starts, corners)
-        places = self.places_of(points, triangles)
+        places = self.match.places_of(points, triangles)
         crossing = set()
         for layer in self.given.uv_maps:
             values, beyond = uv_transfer.corner_coordinates(
@@ -220,7 +154,7 @@ class Transfer:
         return done
 
     def carried(self):
-        own = self.own, self.triangles
+        own = self.own, self.match.triangles
         done, notes = garments.copies(
             self.context, self.source, self.target, self.given, own, rigs.pairs(self.source, self.target)
         )

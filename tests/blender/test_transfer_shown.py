@@ -10,14 +10,20 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
+    from support.blender.baking import cancelled_at
     from support.blender.stacks import add_modifier
+    from support.blender.stages import Operator
 
     from addon.blender import mesh_arrays, modifier_stack
+    from addon.core.runtime import jobs
+    from addon.core.runtime.coroutines import Pause, run_to_completion
     from addon.field_modifier import motion
     from addon.wrap import keys
+    from addon.wrap.operators import ARAPFIELDS_OT_transfer
 
 pytestmark = pytest.mark.in_blender
 
+ATTEMPTS = 5  # a stage of some milliseconds may pass unseen on a busy machine
 SINGLE = 1e-5  # Blender keeps coordinates in single precision
 
 
@@ -132,3 +138,58 @@ def test_a_wrap_that_was_moved_off_its_target_is_not_handed_on(moved):
     assert not target.vertex_groups and target.data.shape_keys is None
     bpy.data.objects[moved].location.x -= 3
     assert bpy.ops.arapfields.transfer() == {"FINISHED"} and wrong_weights(target) < 1e-3
+
+
+def transferred_meanwhile(change):
+    """What the operator says where something changes while it runs in a window, and the target."""
+    item, target = pair()
+    lay(item, target)
+    operator = Operator(ARAPFIELDS_OT_transfer, onto="")
+    coroutine = operator.coroutine(bpy.context)
+    while next(coroutine) is not Pause.WORKER:
+        pass
+    change(item, target)
+    bpy.context.view_layer.update()
+    run_to_completion(coroutine, wait=lambda: jobs.running().join(0.05))
+    jobs.stop()
+    return operator.said, target
+
+
+CHANGES = {
+    "moved": ("Bar", lambda item, target: setattr(item.location, "x", 1.0)),
+    "keys": ("Bar", lambda item, target: setattr(item.data.shape_keys.key_blocks["Up"].data[0].co, "z", 2.0)),
+    "no keys": ("Bar", lambda item, target: item.shape_key_clear()),
+    "target": ("Scan", lambda item, target: setattr(target.data.vertices[0].co, "z", 2.0)),
+    "deleted": ("Scan", lambda item, target: bpy.context.collection.objects.unlink(target)),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_what_changes_meanwhile_is_not_handed_on(change):
+    name, changed = CHANGES[change]
+    said, target = transferred_meanwhile(changed)
+    ending = "was deleted while it was worked on" if change == "deleted" else "changed while it was worked on"
+    assert len(said) == 1 and said[0].startswith(f"{name} {ending}")
+    assert not target.vertex_groups and target.data.shape_keys is None
+
+
+def test_what_moves_together_meanwhile_is_handed_on():
+    def together(item, target):
+        for one in (item, target):
+            one.location.x += 50
+            one.rotation_euler.z = 0.0
+
+    said, target = transferred_meanwhile(together)
+    assert said[0].startswith("Bar: Scan has") and wrong_weights(target) < 1e-3
+
+
+def test_a_cancelled_transfer_leaves_all_as_it_was():
+    item, target = pair()
+    lay(item, target)
+    operator = Operator(ARAPFIELDS_OT_transfer, onto="")
+    for _ in range(ATTEMPTS):
+        if cancelled_at(operator, "Shape Keys") == {"CANCELLED"}:
+            break
+    else:
+        pytest.fail("the stage passed unseen")
+    assert not target.vertex_groups and target.data.shape_keys is None
