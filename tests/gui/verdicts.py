@@ -155,6 +155,7 @@ EXPECTED = {  # of each part, every entry that it finds
         "wrap_moves": above(0.05).each(2),
         **all_of(TRUE, "wrap_undone", "wrap_undone_bones", "wrap_redone", "wrap_redone_bones"),
         "wrap_stack": Rule("a field and an armature", lambda figures: {"NODES", "ARMATURE"} <= {*figures}),
+        **all_of(TRUE, "wrap_transferred", "wrap_transfer_undone", "wrap_transfer_redone"),
         **all_of(TRUE, "wrap_outlives_its_target", "wrap_opened_again"),
         **all_of(TRUE, "sequence_escape", "sequence_undone"),
         "sequence_rises_by": near(0.1, by=0.02),

@@ -20,6 +20,7 @@ from addon.core.runtime import jobs
 SCAN_AT = Vector((2.0, 0, 0))
 # In the sidebar, of a window of 1600 × 1000, with Wrap alone open.
 EYEDROPPER, BUTTON, WRAP = (1263, 240), (1155, 286), (1155, 517)
+TRANSFER = (1165, 722)
 SEQUENCE = (1155, 825)  # the same of an object that is wrapped, its bones fitted
 SETTLED = 1.5  # seconds in which the sidebar's sections slide to where they stay
 
@@ -146,7 +147,30 @@ def press(figures, folder):
         character.pose(types.SimpleNamespace(rig=rig))
     yield 1.0
     stage.picture(folder, "wrap-posed")
+    yield from hand_on(figures, folder)
     yield from target_gone(figures, folder)
+
+
+def hand_on(figures, folder):
+    """Transfer to Target, undone and redone: the scan has the body's groups and an armature of its own."""
+
+    def given():
+        scan = bpy.data.objects["Scan"]
+        return len(scan.vertex_groups), [m.type for m in scan.modifiers]
+
+    bpy.data.objects["Body"].arapfields.wrap.transfer -= {"KEYS"}  # Mirror changes the vertices
+    before = given()
+    yield from click(TRANSFER, pause=0.5)
+    yield from until_idle(60.0)
+    yield 1.0
+    stage.picture(folder, "wrap-transferred")
+    after = given()
+    figures["wrap_transferred"] = after[0] > 0 and after[1] == ["ARMATURE"] and before == (0, [])
+    yield from keys("ctrl+z", pause=1.5)
+    figures["wrap_transfer_undone"] = given() == before
+    yield from keys("ctrl+shift+z", pause=1.5)
+    figures["wrap_transfer_redone"] = given() == after
+    yield from keys("ctrl+z", pause=1.5)  # the armature poses the scan, and landmarks stay
 
 
 def target_gone(figures, folder):
