@@ -9,11 +9,9 @@ from mathutils.kdtree import KDTree
 from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.object_references import ObjectReference
 from ..core.errors import UserError, refuse
-from ..core.geometry.spaces import inverse, space_of, transform
+from ..core.geometry.spaces import inverse, is_in_place, space_of, transform
 from ..handles.movers import matrix_of
 from ..stiffness import painted
-
-LEAST_MOVE = 1e-4  # of a mesh's size: more than what goes along with the armature changes by rounding
 
 
 @dataclass
@@ -37,8 +35,7 @@ class Shape:
     def get(self, rig):
         """The object; UserError where its mesh is another by now, or lies elsewhere beside the bones."""
         item = self.reference.get()
-        moved = np.abs(transform(to_armature(item, rig), self.arrays.vertices) - self.vertices).max()
-        is_there = moved <= LEAST_MOVE * np.ptp(self.vertices, axis=0).max()
+        is_there = is_in_place(transform(to_armature(item, rig), self.arrays.vertices), self.vertices)
         if mesh_arrays.fingerprint(item.data) != self.mark or not is_there:
             raise UserError("{name} changed while it was worked on; run again", item)
         return item

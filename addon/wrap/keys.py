@@ -77,10 +77,11 @@ def shape_at(context, item, kept, values):
 
 def offsets(source):
     """(k, n, 3) of the keys, each from where it starts."""
-    if not of(source):
+    blocks = of(source)
+    if not blocks:
         return np.empty((0, len(source.data.vertices), 3))
     points = {block: points_of(block) for block in source.data.shape_keys.key_blocks}
-    basis, blocks = source.data.shape_keys.reference_key, of(source)
+    basis = source.data.shape_keys.reference_key
     starts = [basis if is_in_circle(block) else block.relative_key for block in blocks]
     return np.array([points[block] - points[start] for block, start in zip(blocks, starts, strict=True)])
 

@@ -6,7 +6,7 @@ import numpy as np
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import ObjectReference
 from ..core.errors import UserError
-from ..core.geometry.spaces import transform
+from ..core.geometry.spaces import is_in_place, transform
 from ..core.runtime import native
 from ..handles.empties import matrix_of
 from ..names import NEUTRAL_KEY
@@ -14,18 +14,12 @@ from . import keys
 from .given import Given
 
 LEAST_POSE = 1e-5  # of the target's size: an armature at rest moves by less, by rounding
-LEAST_MOVE = 1e-4  # of the source's size: more than rounding where both are moved together
 FAR = 0.05  # of the target's diagonal: a wrap leaves half of the vertices nearer than that
 LOOKED_AT = 1000  # vertices at most, to see how far two surfaces are apart
 
 
 def keeps_vertices(modifier):
     return modifier.type in modifier_stack.KEEPING or modifier_stack.is_field(modifier)
-
-
-def to_target(source, target):
-    """(4, 4) from the source's coordinates into the target's."""
-    return np.linalg.inv(matrix_of(target)) @ matrix_of(source)
 
 
 def seen(context, source, target, is_posed):
@@ -40,9 +34,8 @@ def seen(context, source, target, is_posed):
     return shape if len(shape) == len(own) else own
 
 
-def distance(points, mesh):
-    """How far from the surface of a mesh, its vertices and triangles, half of the points are at most."""
-    surface = native.library().MeshSdf(*mesh)
+def distance(points, surface):
+    """How far from a surface half of the points are at most."""
     return np.median(np.abs(surface(points[:: -(-len(points) // LOOKED_AT)])))
 
 
@@ -52,9 +45,8 @@ class Match:
     def __init__(self, context, source, target, with_keys):
         self.ends = ObjectReference(source), ObjectReference(target)
         self.given = Given(context, source)
-        self.to_target, self.mark = to_target(source, target), mesh_arrays.fingerprint(target.data)
-        self.moved = transform(self.to_target, self.given.moved)  # in the target's coordinates, as keys are
-        self.triangles = mesh_arrays.triangles(target.data)
+        self.moved = self.moved_beside(source, target)
+        self.triangles, self.mark = mesh_arrays.triangles(target.data), mesh_arrays.fingerprint(target.data)
         self.unposed, self.posed = (seen(context, source, target, is_posed) for is_posed in (False, True))
         self.offsets = keys.offsets(source) if with_keys else None
 
@@ -62,16 +54,14 @@ class Match:
         """Finds the places of the target's vertices, and the displacements (k, m, 3) of its keys."""
         with_keys = self.offsets is not None
         task = tracker.start("Comparing", 0.3 if with_keys else 1.0)
-        self.own = min((self.unposed, self.posed), key=self.distance)
-        self.refuse_elsewhere()
+        self.own = self.met()
         self.places = self.places_of(self.own, self.triangles, task)
         self.displacements = self.carried(tracker.start("Shape Keys", 1.0)) if with_keys else None
 
     def get(self):
         """The source and the target; UserError where one is not as it was read."""
         source, target = (end.get() for end in self.ends)
-        moved = np.abs(transform(to_target(source, target), self.given.moved) - self.moved).max()
-        is_there = moved <= LEAST_MOVE * np.ptp(self.moved, axis=0).max()
+        is_there = is_in_place(self.moved_beside(source, target), self.moved)
         has_same_keys = self.offsets is None or np.array_equal(keys.offsets(source), self.offsets)
         if not (is_there and has_same_keys):
             raise UserError("{name} changed while it was worked on; run again", source)
@@ -79,19 +69,27 @@ class Match:
             raise UserError("{name} changed while it was worked on; run again", target)
         return source, target
 
-    def distance(self, vertices):
-        """How far from the wrapped source these are: a pose may have come after the wrap."""
-        return distance(vertices, (self.moved, self.given.triangles))
+    def moved_beside(self, source, target):
+        """(n, 3) vertices of the wrapped source in the target's coordinates, as keys are."""
+        return transform(np.linalg.inv(matrix_of(target)) @ matrix_of(source), self.given.moved)
 
-    def refuse_elsewhere(self):
-        """UserError where most of the wrapped source and most of the target lie far from the other."""
-        far = FAR * np.linalg.norm(np.ptp(self.own, axis=0))
-        if self.distance(self.own) > far and distance(self.moved, (self.own, self.triangles)) > far:
+    def met(self):
+        """The target's vertices as they were wrapped onto: a pose may have come after the wrap.
+
+        UserError where most of the wrapped source and most of the target lie far from the other.
+        """
+        mesh_sdf = native.library().MeshSdf
+        wrapped = mesh_sdf(self.moved, self.given.triangles)
+        distances = [distance(vertices, wrapped) for vertices in (self.unposed, self.posed)]
+        own = self.unposed if distances[0] <= distances[1] else self.posed
+        far = FAR * np.linalg.norm(np.ptp(own, axis=0))
+        if min(distances) > far and distance(self.moved, mesh_sdf(own, self.triangles)) > far:
             raise UserError(
                 "{name} does not lie on {target}; move it back, or wrap again",
                 self.ends[0],
                 target=self.ends[1].name,
             )
+        return own
 
     def places_of(self, vertices, triangles, task=None):
         """Where the vertices of a mesh lie on the wrapped source."""
@@ -103,5 +101,5 @@ class Match:
         carried = self.places.displacements(self.offsets, task=task)
         if np.abs(self.own - self.unposed).max() <= LEAST_POSE * np.ptp(self.own, axis=0).max():
             return carried
-        seen, unposed = (self.own, self.triangles), (self.unposed, self.triangles)
-        return native.library().Correspondence(self.unposed, seen, unposed).displacements(carried, task=task)
+        posed, unposed = (self.own, self.triangles), (self.unposed, self.triangles)
+        return native.library().Correspondence(self.unposed, posed, unposed).displacements(carried, task=task)

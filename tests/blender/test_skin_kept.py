@@ -8,12 +8,10 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.baking import cancelled_at
+    from support.blender.baking import cancelled_at, changed_at_work
     from support.blender.skins import person, rest_rig, shirt, weights_of
     from support.blender.stages import Operator
 
-    from addon.core.runtime import jobs
-    from addon.core.runtime.coroutines import Pause, run_to_completion
     from addon.skin.operators import ARAPFIELDS_OT_skin
 
 pytestmark = pytest.mark.in_blender
@@ -90,13 +88,7 @@ def changed_meanwhile(change):
     before = seen_of(body)
     operator = Operator(ARAPFIELDS_OT_skin, poses=8, samples=800)
     operator.scope = "SELECTED"
-    coroutine = operator.coroutine(bpy.context)
-    while next(coroutine) is not Pause.WORKER:
-        pass
-    change(body, rig)
-    bpy.context.view_layer.update()
-    run_to_completion(coroutine, wait=lambda: jobs.running().join(0.05))
-    jobs.stop()
+    changed_at_work(operator, lambda: change(body, rig))
     return operator.said, before, seen_of(body)
 
 

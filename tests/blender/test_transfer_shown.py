@@ -10,13 +10,11 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.baking import cancelled_at
+    from support.blender.baking import cancelled_at, changed_at_work
     from support.blender.stacks import add_modifier
     from support.blender.stages import Operator
 
     from addon.blender import mesh_arrays, modifier_stack
-    from addon.core.runtime import jobs
-    from addon.core.runtime.coroutines import Pause, run_to_completion
     from addon.field_modifier import motion
     from addon.wrap import keys
     from addon.wrap.operators import ARAPFIELDS_OT_transfer
@@ -145,13 +143,7 @@ def transferred_meanwhile(change):
     item, target = pair()
     lay(item, target)
     operator = Operator(ARAPFIELDS_OT_transfer, onto="")
-    coroutine = operator.coroutine(bpy.context)
-    while next(coroutine) is not Pause.WORKER:
-        pass
-    change(item, target)
-    bpy.context.view_layer.update()
-    run_to_completion(coroutine, wait=lambda: jobs.running().join(0.05))
-    jobs.stop()
+    changed_at_work(operator, lambda: change(item, target))
     return operator.said, target
 
 

@@ -15,6 +15,7 @@ from .rotations import best_rotation
 
 UNIFORM_SCALE_TOLERANCE = 1e-5  # relative spread of the scales below which they count as equal
 FLAT_SCALE_TOLERANCE = 1e-6  # smallest scale, relative to the largest
+LEAST_MOVE = 1e-4  # of a shape's size: more than what two objects that move together change by rounding
 
 
 @dataclass(frozen=True)
@@ -139,3 +140,8 @@ def rigid_motion(rest, target):
     motion[:3, :3] = left @ mirror @ right
     motion[:3, 3] = np.asarray(target, float)[:3, 3] - motion[:3, :3] @ np.asarray(rest, float)[:3, 3]
     return motion
+
+
+def is_in_place(points, before):
+    """Whether points (n, 3) are where they were, but for the rounding of objects that move together."""
+    return np.abs(points - before).max() <= LEAST_MOVE * np.ptp(before, axis=0).max()

@@ -62,6 +62,17 @@ def cancelled_at(operator, stage):
         jobs.stop()
 
 
+def changed_at_work(operator, change):
+    """Steps it, changes something while its worker runs, and goes on to its end."""
+    coroutine = operator.coroutine(bpy.context)
+    while next(coroutine) is not Pause.WORKER:
+        pass
+    change()
+    bpy.context.view_layer.update()
+    run_to_completion(coroutine, wait=lambda: jobs.running().join(0.05))
+    jobs.stop()
+
+
 def saved_animation(name="Bar", folder=None):
     """A bar whose right end rises from frame 1 to frame 5, in a saved file; (bar, its folder)."""
     animated(name)
