@@ -9,10 +9,10 @@ import numpy as np
 from mathutils import Matrix
 
 from ..blender import mesh_arrays
+from ..blender.actions import curves_of
 from ..blender.evaluation import updated
 from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
-from ..solver.frame_range import curves_of
 from . import export_checks
 from .caches import plain, size_text
 from .frames import playing

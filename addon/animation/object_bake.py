@@ -5,13 +5,14 @@ import functools
 import json
 
 from ..blender import mesh_arrays
+from ..blender.actions import has_keys
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError, as_user_error
 from ..handles import empties
 from ..live import sessions
 from ..results import placement, result_objects, visibility
-from ..solver import contact, frame_range, secondary_motion
+from ..solver import contact, secondary_motion
 from ..solver.frame_solver import FrameSolver
 from ..solver.setup import sampled
 from ..solver.simulation import Poses, Simulation
@@ -32,7 +33,7 @@ def kind_of(source, kind):
     if settings.live_kind:
         return settings.live_kind
     has_handles = bool(empties.used(source))
-    styled = settings.stylize.use_handles if has_handles else frame_range.has_keys(source, STYLE_PATH)
+    styled = settings.stylize.use_handles if has_handles else has_keys(source, STYLE_PATH)
     return "STYLIZE" if styled else "DEFORM"
 
 

@@ -30,3 +30,16 @@ def remove_curves(owner, is_removed):
         owner.animation_data.action = None
         if action.users == 0:
             bpy.data.actions.remove(action)
+
+
+def has_keys(item, path):
+    """Whether an object's own action moves properties whose path begins like that."""
+    data = item.animation_data
+    action = data.action if data is not None else None
+    return action is not None and any(curve.data_path.startswith(path) for curve in curves_of(action))
+
+
+def curves_of(action):
+    """An action's curves."""
+    for bag in bags_of(action):
+        yield from bag.fcurves

@@ -16,6 +16,7 @@ from .removal import remove_modifier
 from .splat_layouts import holds_splats
 
 STAGE = "arapfields_stage"  # custom property of the scene that holds the copy
+TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")  # what tells a scene's time by its frame
 FREE_NORMALS = "custom_normal"  # attribute of custom normals; free ones are vectors, Blender 4.5 and later
 # What a new field modifier comes before, at the end of a stack: it refines the shape and follows it.
 REFINING = {"SUBSURF", "MULTIRES", "BEVEL", "SOLIDIFY", "EDGE_SPLIT", "WEIGHTED_NORMAL", "NORMAL_EDIT"}
@@ -165,6 +166,8 @@ def staged(context, source, kept):
     try:
         stage[STAGE] = True
         stage.frame_current, stage.frame_subframe = context.scene.frame_current, context.scene.frame_subframe
+        for name in TIME:
+            setattr(stage.render, name, getattr(context.scene.render, name))
         layer = stage.view_layers[0]
         updated(layer)  # the frame is set before there is anything to animate
         copied = cut_copy(source, {modifier.name for modifier in kept})

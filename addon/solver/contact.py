@@ -8,13 +8,13 @@ import bpy
 import numpy as np
 
 from ..blender import mesh_arrays
+from ..blender.actions import has_keys
 from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import in_scene, settings_of
 from ..blender.property_definitions import from_single_precision
 from ..core.errors import UserError
 from ..core.geometry.spaces import inverse, space_of, transform
 from ..core.runtime import native
-from .frame_range import has_keys
 
 DIGITS = 5  # of an uneven scale: what turns in single precision stays the same solid
 

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which frames the animation of a source's handles, style or target spans."""
 
-from ..blender.actions import bags_of
+import bpy
+
 from ..blender.object_references import settings_of
+from ..field_modifier import inputs
 from ..handles import empties, movers
+from .contact import listed
 
 
 def animation_range(source, kind):
@@ -21,62 +24,57 @@ def scene_range(scene):
 
 
 def involved(source, kind):
-    """The objects, and what they hang on, whose animation a source's shape follows; each once."""
-    style = settings_of(source).stylize
-    used, onto = [source], settings_of(source).wrap.onto
-    if kind == "WRAP" and onto is not None:
-        used.append(onto)
+    """The data-blocks, and what they hang on, whose animation a source's shape follows; each once."""
+    settings = settings_of(source)
+    used, style = [source], settings.stylize
+    if kind == "WRAP":
+        used.append(settings.wrap.onto)
     if kind == "DEFORM" or (kind == "STYLIZE" and style.use_handles):
         used += [movers.mover_of(entry) for entry in empties.used(source)]
     if kind == "STYLIZE":
-        used += [item for item in (style.frame_object, style.style_object) if item is not None]
-    objects = {}
+        used += [style.frame_object, style.style_object]
+    if kind != "WRAP" and settings.contact.use:
+        used += [item for entry in settings.contact.obstacle_list for item in listed(entry)]
+    found = {}
     while used:
-        item = used.pop()
-        if item.name_full in objects:
+        one = used.pop()
+        if one is None or one in found:
             continue
-        objects[item.name_full] = item
-        used += [] if item.parent is None else [item.parent]
-        targets = [getattr(constraint, "target", None) for constraint in item.constraints]
-        targets += [getattr(modifier, "object", None) for modifier in item.modifiers]
-        used += [target for target in targets if target is not None]
-        used += drivers(item)
-    return list(objects.values())
+        found[one] = None
+        if isinstance(one, bpy.types.Object):
+            bones = one.pose.bones if one.pose is not None else ()
+            used += [one.parent, one.data, *objects_of(one.modifiers), *objects_of(one.constraints)]
+            used += [item for bone in bones for item in objects_of(bone.constraints)]
+        used += [getattr(one, "shape_keys", None), *read_by_drivers(one)]
+    return list(found)
 
 
-def drivers(item):
-    """The objects from which drivers of this one read."""
-    data = item.animation_data
-    targets = [
-        target.id
-        for curve in (data.drivers if data else ())
-        for variable in curve.driver.variables
-        for target in variable.targets
-    ]
-    return [target for target in targets if hasattr(target, "matrix_world")]
+def objects_of(parts):
+    """The objects on which modifiers or constraints hang: targets, poles, inputs of nodes."""
+    for part in parts:
+        for holder in (part, *getattr(part, "targets", ())):
+            names = [one.identifier for one in holder.bl_rna.properties if one.type == "POINTER"]
+            values = [getattr(holder, name) for name in names]
+            if getattr(holder, "type", "") == "NODES" and holder.node_group is not None:
+                values += inputs.objects(holder)
+            yield from (value for value in values if isinstance(value, bpy.types.Object))
+
+
+def read_by_drivers(item):
+    """The data-blocks from which drivers of this one read."""
+    data = getattr(item, "animation_data", None)
+    for curve in data.drivers if data else ():
+        yield from (target.id for variable in curve.driver.variables for target in variable.targets)
 
 
 def ranges_of(item):
-    """(first, last) of each action and strip that moves an object."""
-    for data in [one.animation_data for one in (item, getattr(item.data, "shape_keys", None)) if one]:
-        if data is None:
-            continue
-        if data.action is not None:
-            yield tuple(data.action.frame_range)
-        for track in data.nla_tracks:
-            for strip in track.strips:
-                if not track.mute and not strip.mute:
-                    yield strip.frame_start, strip.frame_end
-
-
-def has_keys(item, path):
-    """Whether an object's own action moves properties whose path begins like that."""
-    data = item.animation_data
-    action = data.action if data is not None else None
-    return action is not None and any(curve.data_path.startswith(path) for curve in curves_of(action))
-
-
-def curves_of(action):
-    """An action's curves."""
-    for bag in bags_of(action):
-        yield from bag.fcurves
+    """(first, last) of each action and strip that moves a data-block."""
+    data = getattr(item, "animation_data", None)
+    if data is None:
+        return
+    if data.action is not None:
+        yield tuple(data.action.frame_range)
+    for track in data.nla_tracks:
+        for strip in track.strips:
+            if not track.mute and not strip.mute:
+                yield strip.frame_start, strip.frame_end

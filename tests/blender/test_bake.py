@@ -15,8 +15,8 @@ if IN_BLENDER:
     from support.blender.riders import rider
 
     from addon.animation import caches
+    from addon.blender.actions import curves_of
     from addon.core.runtime import jobs
-    from addon.solver.frame_range import curves_of
     from addon.solver.frame_solver import FrameSolver
 
 pytestmark = pytest.mark.in_blender

@@ -14,8 +14,8 @@ if IN_BLENDER:
     from support.blender.riders import body, rider, shown
     from support.blender.scenes import camera
 
+    from addon.blender.actions import curves_of
     from addon.live import sessions
-    from addon.solver.frame_range import curves_of
 
 pytestmark = pytest.mark.in_blender
 

@@ -137,6 +137,19 @@ def test_reading_the_shape_leaves_unkeyed_poses_alone():
     assert abs(bone.rotation_euler.z - 1.1) < 1e-6 and seen > 0.6
 
 
+def test_the_shape_is_read_at_the_scenes_own_time():
+    """However its frames are mapped, also where a modifier after the place has it read from a copy."""
+    bar, scene = scenes.bar(), bpy.context.scene
+    wave = bar.modifiers.new("Wave", "WAVE")
+    wave.height, wave.width, wave.time_offset = 0.3, 1.0, -30.0
+    scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
+    scene.frame_set(41)
+    shown = local_points(bar)
+    bar.modifiers.new("Subdivision", "SUBSURF")
+    with modifier_stack.evaluated_mesh(bpy.context, bar, in_place=True) as mesh:
+        assert np.array_equal([vertex.co for vertex in mesh.vertices], shown)
+
+
 def test_reading_the_shape_leaves_no_users_behind():
     bar, *_ = scenes.bar_with_handles()
     group = bpy.data.node_groups.new("Beside", "GeometryNodeTree")
