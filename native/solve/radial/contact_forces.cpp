@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // How hard planes press, and the least motion that brings a surface out, by the quasi-Newton model.
+#include "solve/radial/contact_forces.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "sampling/sample_choice.h"
 #include "solve/radial/contact_rows.h"
-#include "solve/radial/contact_solve.h"
 
 namespace arapfields {
 namespace {
@@ -20,6 +21,8 @@ constexpr int searches = 5;
 constexpr double apart = 0.02;
 /// A way out is at most so many times as long as the deepest place is deep.
 constexpr double farther = 3.0;
+/// Steps in time leave nothing deeper beyond a margin, in cube units.
+constexpr double deep_in_motion = 3.0 * ContactSet::deep;
 /// What may be left of a gap, in cube units.
 constexpr double slight = 1e-4;
 
@@ -52,6 +55,11 @@ Vector gaps_of(const ContactSet& set, const Points& places) {
 
 }  // namespace
 
+Points contact_places(RadialState& s) {
+  const VectorF& u = s.measurements(s.fast);
+  return s.fast.objective.latest()->contact_values(u).cast<double>();
+}
+
 void stiffen_contact(RadialState& s) {
   if (!s.contact.presses()) return;
   s.fast.objective.latest()->set_contact_stiffness(
@@ -65,6 +73,17 @@ bool would_press(RadialState& s) {
                      [&](const ContactPlane& p) {
                        return p.pressed(p.gap(places.data()), s.contact.found().stiffness) > 0.0;
                      });
+}
+
+double press_contact(RadialState& s) {
+  if (!s.contact.presses()) return 0.0;
+  return s.contact.press(contact_places(s).data(), Vector::Ones(s.contact.surface_count()));
+}
+
+bool is_deep(RadialState& s) {
+  const Points places = contact_places(s);
+  return std::any_of(s.contact.found().planes.begin(), s.contact.found().planes.end(),
+                     [&](const ContactPlane& p) { return p.gap(places.data()) < -deep_in_motion; });
 }
 
 void press_balanced(RadialState& s) {

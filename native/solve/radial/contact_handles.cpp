@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Handles give way: what they hold stays beyond the planes that were found, as it is, and is not squashed.
+#include "solve/radial/contact_handles.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,7 +11,7 @@
 #include "fields/radial_evaluator.h"
 #include "sampling/oriented_points.h"
 #include "sampling/sample_choice.h"
-#include "solve/radial/contact_solve.h"
+#include "solve/radial/contact_forces.h"
 #include "solve/radial/handle_motion.h"
 
 namespace arapfields {
@@ -26,6 +28,8 @@ constexpr double unmoved = 1e-3;
 /// What the shape itself holds back is pulled by no more than from so far, in cube units: neighbours, held
 /// back in unlike ways, would squash what is between them.
 constexpr double longest_pull = 0.01;
+/// Handles farther from their targets against a force, in cube units, are held back.
+constexpr double held_back = 0.02;
 /// Searches for the thickest part of the shape beside a point handle, which may lie at an edge.
 constexpr int thicker = 3;
 
@@ -270,6 +274,34 @@ void set_reachable_targets(RadialState& s, std::vector<Mat4> motions, bool gentl
           values.middleRows(first, last - first) + longest_pull / length * left;
   }
   objective.set_targets(targets);
+}
+
+std::vector<HeldBack> held_back_handles(RadialState& s) {
+  std::vector<HeldBack> result;
+  const RadialObjective<float>& objective = s.objective(s.fast);  // of the planes that were found last
+  const Points places = contact_places(s);
+  const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();
+  const Points& targets = s.handles.pairs().targets;
+  const Index own = s.handles.any() ? s.handles.own_count() : 0;
+  std::vector<Mat4> motions = motions_of(s.handles.bound());
+  const std::vector<Index> surfaces = hold_back(s, motions);
+  for (Index first = 0, last = 0; first < own; first = last) {
+    const Index handle = s.handles.handle_of(first);
+    while (last < own && s.handles.handle_of(last) == handle) ++last;
+    const Points left = (targets - values).middleRows(first, last - first);
+    const double distance = left.rowwise().norm().mean();
+    if (distance < held_back) continue;
+    const Vec3 middle = values.middleRows(first, last - first).colwise().mean();
+    const Vector along = s.contact.found().forces_at(middle, places.data(), s.contact.surface_count()) *
+                         left.colwise().mean().transpose();
+    Index by = 0;
+    const bool pressed = along.minCoeff(&by) < 0.0;
+    const Index back = surfaces[static_cast<std::size_t>(handle)];
+    if (back >= 0 || pressed)
+      result.push_back(
+          {handle, s.contact.name_of(back >= 0 ? back : by), s.problem.frame().scale * distance});
+  }
+  return result;
 }
 
 }  // namespace arapfields

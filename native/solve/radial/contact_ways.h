@@ -20,6 +20,7 @@ struct ContactSet {
   Revision revision = 0;                  ///< 0: no planes
   double stiffness = 0.0;                 ///< of energy a unit of area for a unit of squared depth, halved
   static constexpr double softest = 5e4;  ///< the stiffness at first
+  static constexpr double deep = 5e-4;    ///< solves leave no place deeper beyond a margin, in cube units
 
   /// The share of the area that presses.
   double touching() const;

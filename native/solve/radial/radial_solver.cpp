@@ -156,7 +156,7 @@ Index RadialSolver::follow(Index iterations, double tolerance, const Progress& p
   const bool is_exact = tolerance < single_tolerance;
   const auto freely = [&](Index steps) { follow_freely(s, steps, tolerance, progress); };
   if (s.contact.any())
-    follow_in_contact(s, iterations, std::max(tolerance, single_tolerance), freely, progress);
+    ContactSolve(s, iterations, std::max(tolerance, single_tolerance), freely, progress).follow();
   else
     freely(iterations);
   if (!s.handles.any() && s.hooks.energies.empty() && !s.contact.presses()) anchor_lowest_point(s);

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/radial/contact_approach.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "solve/radial/contact_forces.h"
+#include "solve/radial/contact_handles.h"
+#include "solve/radial/handle_motion.h"
+
+namespace arapfields {
+namespace {
+
+/// How far an obstacle moves in a step, in cube units.
+constexpr double obstacle_step = 0.02;
+/// Quasi-Newton steps between two searches for planes.
+constexpr Index steps_between = 6;
+/// Solves of so many iterations whose handles or obstacles come from far go on to their end, where rounding
+/// changes less: so many quasi-Newton steps each time, until a round moves no sample
+/// farther, in cube units. Not where the surface meets itself: handles that meet would stop each other.
+constexpr Index patient = 30, steps_to_the_end = 20;
+constexpr double at_rest = 1e-3;
+/// Pushes at the end, while something is deep but nearly out.
+constexpr int most_pushes = 6;
+/// Rounds beyond the iterations that were asked for, while something is deep; of the shape itself, only
+/// while that falls.
+constexpr Index more_rounds = 4;
+/// Depths fall where a round leaves no more than this share. Planes become stiffer where they do not.
+constexpr double still_comes_out = 0.8;
+/// A round that ends too deep is taken back by halves, so many times at most.
+constexpr int most_halves = 4;
+/// What single precision cannot see of an energy.
+constexpr double floor = 1e-10;
+constexpr double deep = ContactSet::deep;
+
+PointsF sample_places(RadialState& s) { return s.objective(s.fast).sample_values(s.measurements(s.fast)); }
+
+}  // namespace
+
+bool ContactApproach::goes_to_its_end() const {
+  return iterations_ >= patient && !state_.in_one_go && !state_.contact.itself();
+}
+
+/// Finds the planes near the surface, and brings it beyond them as long as it is deep, but no deeper than
+/// `from`.
+void ContactApproach::find_and_push(int pushes, double from) {
+  RadialState& s = state_;
+  double depth = s.contact.find(s.shape.coefficients);
+  s.objective(s.fast);
+  for (int push = 0; push < pushes && depth > deep && depth < from; ++push) {
+    const RowMatrix<double> before = s.shape.coefficients;
+    const ContactWays ways = s.contact.ways();
+    push_out(s);
+    const double next = s.contact.find(s.shape.coefficients);
+    const bool worse = next >= depth;
+    if (worse) {
+      s.shape.coefficients = before;
+      ++s.shape.revision;
+      s.contact.set_ways(ways);
+      s.contact.find(s.shape.coefficients);
+    }
+    s.objective(s.fast);
+    if (worse) break;
+    depth = next;
+  }
+}
+
+/// Descends, and updates the pressures. Whether the descent converged. Goes back towards `before` where that
+/// meets what was not near there.
+bool ContactApproach::solve_round(const RowMatrix<double>& before, Index iterations) {
+  RadialState& s = state_;
+  stiffen_contact(s);
+  const double allowed = std::max(too_deep, s.contact.deepest());
+  const bool converged = s.descend(s.fast, {iterations, tolerance_, floor}, progress_).converged;
+  press_balanced(s);
+  const ContactWays ways = s.contact.ways();
+  double depth = s.contact.find(s.shape.coefficients, std::nullopt);
+  bool back = false;
+  for (int half = 0; half < most_halves && depth > allowed; ++half) {
+    back = true;
+    s.shape.coefficients = 0.5 * (s.shape.coefficients + before);
+    ++s.shape.revision;
+    s.contact.set_ways(ways);
+    depth = s.contact.find(s.shape.coefficients);
+  }
+  return converged && !back;
+}
+
+void ContactApproach::sweep(const std::vector<Mat4>& motions) {
+  RadialState& s = state_;
+  if (s.contact.obstacle_way() == 0.0) return;
+  const auto wanted = static_cast<Index>(std::ceil(s.contact.obstacle_way() / obstacle_step));
+  const Index steps = std::clamp<Index>(wanted, 1, usual.most_steps);
+  const Index at_once = goes_to_its_end() ? steps_to_the_end : usual.iterations;
+  s.precondition(0.0);
+  for (Index k = 1; k <= steps; ++k) {
+    s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(steps));
+    find_and_push(1, too_deep);
+    if (k == steps || !s.contact.presses()) continue;
+    s.objective(s.fast);
+    set_reachable_targets(s, motions);
+    solve_round(RowMatrix<double>(s.shape.coefficients), at_once);
+  }
+}
+
+void ContactApproach::approach(const std::vector<Mat4>& motions, double way, const Pace& pace) {
+  const auto steps = static_cast<Index>(std::ceil(way / length(pace)));
+  approach_by(motions, std::clamp<Index>(steps, 1, pace.most_steps), pace.iterations);
+}
+
+/// In so many steps, with `on_the_way` iterations in all but the last.
+void ContactApproach::approach_by(const std::vector<Mat4>& motions, Index steps, Index on_the_way) {
+  RadialState& s = state_;
+  s.precondition(0.0);
+  const bool to_its_end = steps > 1 && goes_to_its_end();
+  if (to_its_end) on_the_way = steps_to_the_end;
+  s.contact.find(s.shape.coefficients);
+  SolveHistory::Start start{s.shape.coefficients, {}};
+  const int uses = s.fast.uses;
+  for (Index k = 1; k < steps; ++k) {
+    const double share = static_cast<double>(k) / static_cast<double>(steps);
+    s.objective(s.fast);
+    set_reachable_targets(s, motions_between(s.handles.bound(), motions, share));
+    solve_round(RowMatrix<double>(s.shape.coefficients), on_the_way);
+  }
+  solve_to_targets(motions_between(s.handles.bound(), motions, 1.0), to_its_end,
+                   steps == 1 ? &start : nullptr);
+  find_and_push(most_pushes, nearly);
+  if (s.fast.uses <= uses) start.u.resize(0);
+  s.history.start.set(s.start_revisions(), std::move(start));
+}
+
+/// Solves in rounds until it converges with nothing deep, or until the iterations run out and depths fall no
+/// more. A `start`, if not null, is a drag's, which goes on as it went.
+void ContactApproach::solve_to_targets(const std::vector<Mat4>& motions, bool to_its_end,
+                                       SolveHistory::Start* start) {
+  RadialState& s = state_;
+  const Index in_a_round = to_its_end ? steps_to_the_end : steps_between;
+  Index left = iterations_, extra = more_rounds;
+  double last = std::numeric_limits<double>::infinity(), least = last;
+  for (;;) {
+    s.objective(s.fast);
+    const PointsF places = to_its_end ? sample_places(s) : PointsF();
+    set_reachable_targets(s, motions);
+    const RowMatrix<double> here = s.shape.coefficients;
+    if (start != nullptr && extra == more_rounds) *start = s.extrapolate();
+    const Index at_once = std::clamp<Index>(left, 2, in_a_round);
+    const bool converged = solve_round(here, at_once);
+    left -= at_once;
+    const double depth = s.contact.deepest();
+    const bool rests = !to_its_end || (sample_places(s) - places).rowwise().norm().maxCoeff() < at_rest;
+    if (converged && depth < deep && rests) return;
+    s.contact.harden(depth > deep && depth < nearly && depth > still_comes_out * last);
+    last = depth;
+    if (left <= 0 && (depth < deep || extra-- == 0)) return;
+    if (left <= 0 && s.contact.deepest_outside() < deep && depth > still_comes_out * least) return;
+    least = std::min(least, depth);
+  }
+}
+
+}  // namespace arapfields
