@@ -237,7 +237,7 @@ def remove(source, index):
     """Takes a handle off the source's list; its Empty stays as an ordinary one."""
     settings = settings_of(source)
     empty = settings.handles[index].empty
-    if empty is not None:
+    if empty is not None and settings_of(empty).handle_of == source:
         settings_of(empty).handle_of = None
     settings.handles.remove(index)
     choose_row(settings, max(0, min(settings.active_handle, len(settings.handles) - 1)))

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..blender.object_references import in_scene
+from ..blender.object_references import in_scene, settings_of
 from ..core.geometry.handles import box_matrix
 from ..names import BONE_NUMBER
 
@@ -79,9 +79,17 @@ def bone_box(bone):
     return box
 
 
+def owner_elsewhere(entry):
+    """The object whose handle an entry's Empty is, where that is another: copies of objects list the same."""
+    owner = settings_of(entry.empty).handle_of
+    if owner in (None, entry.id_data) or not in_scene(owner):
+        return None
+    return owner if any(one.empty == entry.empty for one in settings_of(owner).handles) else None
+
+
 def has_mover(entry):
     if entry.kind != "BONE":
-        return in_scene(entry.empty)
+        return in_scene(entry.empty) and owner_elsewhere(entry) is None
     return in_scene(entry.rig) and entry.rig.pose is not None and bone_of(entry) in entry.rig.pose.bones
 
 

@@ -196,8 +196,9 @@ class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
         rows = [index for index, entry in enumerate(settings.handles) if entry in chosen]
         for index in reversed(rows):
             empty = settings.handles[index].empty
+            is_own = empty is not None and settings_of(empty).handle_of == source
             empties.remove(source, index)
-            if self.delete and empty is not None:
+            if self.delete and is_own:
                 bpy.data.objects.remove(empty)
         return translated("{count} handles removed", count=len(rows))
 

@@ -3,7 +3,7 @@ import bpy
 
 from ..blender import icons
 from ..blender.language import translated
-from ..blender.object_references import source_of
+from ..blender.object_references import in_scene, source_of
 from ..blender.section import Section, draw_settings, group_row, note, switched, wrapped
 from ..names import Op
 from . import empties, movers, scaling
@@ -17,11 +17,21 @@ def anchor_icon(entry):
     return {"icon_value": number} if number else {"icon": "PINNED" if entry.anchor else "LAYER_USED"}
 
 
+def draw_lost(row, entry):
+    """The row of a handle that nothing moves, or that moves another object."""
+    owner = movers.owner_elsewhere(entry) if entry.kind != "BONE" and in_scene(entry.empty) else None
+    if owner is None:
+        row.label(text="(deleted)", icon="ERROR")
+    else:
+        text = translated("{name} (of {owner})", name=entry.empty.name, owner=owner.name)
+        row.label(text=text, icon="ERROR", translate=False)
+
+
 class ARAPFIELDS_UL_handles(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_propname, index):
         row = layout.row(align=True)
         if not movers.has_mover(item):
-            row.label(text="(deleted)", icon="ERROR")
+            draw_lost(row, item)
             return
         swatch = row.row()
         swatch.ui_units_x = 0.8
