@@ -26,7 +26,7 @@ def build_example(folder, *definitions, python=sys.executable, target="bend"):
     python = f"-DPython_EXECUTABLE={python}"
     run(CMAKE, "-S", folder / "source", "-B", folder / "build", *ninja, python, *definitions)
     run(CMAKE, "--build", folder / "build", "--target", target)
-    return folder / "build" / "bend"
+    return folder / "build" / target
 
 
 def pillar():
@@ -64,12 +64,16 @@ def bent(python):
         return np.load(f"{folder}/bent.npy")
 
 
+def write_obj(path, vertices, triangles):
+    lines = [f"v {x} {y} {z}\n" for x, y, z in vertices] + [f"f {a} {b} {c}\n" for a, b, c in triangles + 1]
+    path.write_text("".join(lines))
+
+
 def check_example(program, tmp_path, python=sys.executable):
     """The program bends a pillar as that Python does."""
     vertices, triangles = pillar()
     rest, moved = tmp_path / "rest.obj", tmp_path / "moved.obj"
-    lines = [f"v {x} {y} {z}\n" for x, y, z in vertices] + [f"f {a} {b} {c}\n" for a, b, c in triangles + 1]
-    rest.write_text("".join(lines))
+    write_obj(rest, vertices, triangles)
     assert re.fullmatch(r"stretch [\d.e-]+, bend [\d.e-]+\n", run(program, rest, moved, cwd=tmp_path))
     ours, same_triangles = meshes.read(moved)
     assert (same_triangles == triangles).all()
@@ -98,15 +102,23 @@ def test_one_version_of_cmake_is_asked_for():
     assert len(asked) == 7 and len(set(asked.values())) == 1, asked
 
 
-@pytest.mark.parametrize("place", ["prefix", "wheel"])
-def test_the_example_gives_what_python_gives(place, prefix, tmp_path):
-    """The wheel's neighbour has Eigen: no Python need be found, no environment be activated."""
-    if place == "prefix":
-        program = build_example(tmp_path, f"-DCMAKE_PREFIX_PATH={prefix}", target="all")
-    else:
-        found = f"-Darapfields_DIR={run(sys.executable, '-m', 'arapfields', '--cmake-dir').strip()}"
-        program = build_example(tmp_path, found, python=tmp_path / "absent")
-    check_example(program, tmp_path)
+def test_the_example_gives_what_python_gives(tmp_path):
+    """Against the wheel, whose neighbour has Eigen: no Python need be found, no environment be activated."""
+    found = f"-Darapfields_DIR={run(sys.executable, '-m', 'arapfields', '--cmake-dir').strip()}"
+    check_example(build_example(tmp_path, found, python=tmp_path / "absent"), tmp_path)
+
+
+def test_the_calls_of_the_page_run(prefix, tmp_path):
+    """Against what CMake installs. A call that is cancelled before it begins says so."""
+    rest = tmp_path / "rest.obj"
+    vertices, triangles = meshes.sphere(subdivisions=2)
+    write_obj(rest, vertices, triangles)
+    program = build_example(tmp_path, f"-DCMAKE_PREFIX_PATH={prefix}", target="calls")
+    cancelled, *counts = run(program, rest, cwd=tmp_path).splitlines()
+    assert cancelled.startswith("cancelled at 0")
+    fit, ball, moved, _, posed, two, one, remeshed, on_triangles = map(int, " ".join(counts).split())
+    assert min(fit, ball, remeshed) > 500 and two == on_triangles == 2000 and one == 1
+    assert moved == posed == len(vertices)
 
 
 @pytest.mark.slow
