@@ -51,11 +51,22 @@ def process(*arguments):
 
 
 def wait_until_at_work(running):
-    """Sleeps until a process has loaded the library and gone on for a while."""
-    maps = Path(f"/proc/{running.pid}/maps")  # Linux alone has it
-    while maps.exists() and "_native" not in maps.read_text() and running.poll() is None:
-        time.sleep(0.05)
-    time.sleep(1.5 if maps.exists() else 3.0)
+    """Sleeps until a process has loaded the library and worked on for a while, on however busy a machine."""
+    process = Path(f"/proc/{running.pid}")  # Linux alone has it
+    if not process.exists():
+        return time.sleep(3.0)
+
+    def worked():
+        user, system = (process / "stat").read_text().rpartition(")")[2].split()[11:13]
+        return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
+    def waits(is_done):
+        while running.poll() is None and not is_done():
+            time.sleep(0.05)
+
+    waits(lambda: "_native" in (process / "maps").read_text())
+    begun = worked()
+    waits(lambda: worked() > begun + 1.0)
 
 
 def write_octahedron(path, quads=False):
