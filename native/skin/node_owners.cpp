@@ -238,49 +238,59 @@ bool NodeOwners::lies_about(const Nodes& nodes, const Bone& bone) const {
 /// above all, and of bones next to the nearest of these. A ring belongs with the bones inside it.
 void NodeOwners::touch(const Skeleton& skeleton) {
   std::map<Index, Nodes> without;
-  Nodes all, seen;
   for (std::size_t i = 0; i < best_.size(); ++i)
     if (!has_bone(i)) without[piece(i)].push_back(i);
   if (without.empty()) return;
+  const auto [seen, all] = nodes_with_bones();
   const BoneTree tree(skeleton);
-  std::vector<char> hidden(best_.size(), 0);
-  parallel_for(0, graph_.size(), 16, [&](Index first, Index last) {
-    for (Index i = first; i < last; ++i) hidden[i] = has_bone(i) && within_another(i) ? 1 : 0;
-  });
-  for (std::size_t i = 0; i < best_.size(); ++i)
-    if (has_bone(i)) (hidden[i] == 0 ? seen : all).push_back(i);
-  all.insert(all.end(), seen.begin(), seen.end());
-  if (seen.empty()) seen = all;
-  const auto turned = [&](std::size_t i, std::size_t j) {  // in squares of the spacing
-    const auto& normals = surfaces_.normals;
-    return spacing_ * spacing_ * (normals.row(nodes_[i]) - normals.row(nodes_[j])).squaredNorm();
-  };
   for (const auto& [piece, own] : without) {
     std::vector<bool> about;
     for (Index b = 0; b < skeleton.count(); ++b) about.push_back(lies_about(own, skeleton.bone(b)));
     Nodes others;
     std::ranges::copy_if(all, std::back_inserter(others),
                          [&](std::size_t j) { return about[best_[j].second]; });
-    if (others.empty()) others = seen;
-    std::vector<std::pair<double, std::size_t>> near;
-    for (const std::size_t i : own) {
-      near.emplace_back(std::numeric_limits<double>::infinity(), 0);
-      for (const std::size_t j : others)
-        near.back() = std::min(near.back(), {square(i, j) + turned(i, j), j});
-    }
-    const double reach = std::sqrt(std::ranges::min_element(near)->first) + touching_spacings * spacing_;
-    std::map<Index, float> lengths;  // of the bones that it touches
-    for (const auto& [away, j] : near)
-      if (away <= reach * reach) lengths[best_[j].second] = 0.0f;
-    for (auto& [b, length] : lengths)
-      for (const std::size_t i : own) length += straight_(static_cast<Index>(i), b);
-    const Index main =
-        std::ranges::min_element(lengths, {}, [](const auto& each) { return each.second; })->first;
-    for (std::size_t k = 0; k < own.size(); ++k)
-      if (const Index b = best_[near[k].second].second;
-          near[k].first <= reach * reach && tree.matters(b, main, 0.0))
-        best_[own[k]] = {0.0f, b};
+    join(own, others.empty() ? seen : others, tree);
   }
+}
+
+/// Nodes that have bones: those that lie in no other surface, or all if none does; and all of them, these
+/// last.
+std::pair<NodeOwners::Nodes, NodeOwners::Nodes> NodeOwners::nodes_with_bones() const {
+  std::vector<char> hidden(best_.size(), 0);
+  parallel_for(0, graph_.size(), 16, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) hidden[i] = has_bone(i) && within_another(i) ? 1 : 0;
+  });
+  Nodes all, seen;
+  for (std::size_t i = 0; i < best_.size(); ++i)
+    if (has_bone(i)) (hidden[i] == 0 ? seen : all).push_back(i);
+  all.insert(all.end(), seen.begin(), seen.end());
+  return {seen.empty() ? all : seen, all};
+}
+
+/// Nodes of a surface without bones belong with the nearest of the others where these are near enough, but
+/// not with bones that cannot matter beside the one that is nearest to the whole.
+void NodeOwners::join(const Nodes& own, const Nodes& others, const BoneTree& tree) {
+  const auto turned = [&](std::size_t i, std::size_t j) {  // in squares of the spacing
+    const auto& normals = surfaces_.normals;
+    return spacing_ * spacing_ * (normals.row(nodes_[i]) - normals.row(nodes_[j])).squaredNorm();
+  };
+  std::vector<std::pair<double, std::size_t>> near;
+  for (const std::size_t i : own) {
+    near.emplace_back(std::numeric_limits<double>::infinity(), 0);
+    for (const std::size_t j : others) near.back() = std::min(near.back(), {square(i, j) + turned(i, j), j});
+  }
+  const double reach = std::sqrt(std::ranges::min_element(near)->first) + touching_spacings * spacing_;
+  std::map<Index, float> lengths;  // of the bones that it touches
+  for (const auto& [away, j] : near)
+    if (away <= reach * reach) lengths[best_[j].second] = 0.0f;
+  for (auto& [b, length] : lengths)
+    for (const std::size_t i : own) length += straight_(static_cast<Index>(i), b);
+  const Index main =
+      std::ranges::min_element(lengths, {}, [](const auto& each) { return each.second; })->first;
+  for (std::size_t k = 0; k < own.size(); ++k)
+    if (const Index b = best_[near[k].second].second;
+        near[k].first <= reach * reach && tree.matters(b, main, 0.0))
+      best_[own[k]] = {0.0f, b};
 }
 
 bool NodeOwners::within_another(std::size_t node) const {

@@ -40,6 +40,8 @@ class NodeOwners {
   void fill();
   bool lies_about(const Nodes& nodes, const Bone& bone) const;
   void touch(const Skeleton& skeleton);
+  std::pair<Nodes, Nodes> nodes_with_bones() const;
+  void join(const Nodes& own, const Nodes& others, const BoneTree& tree);
   bool within_another(std::size_t node) const;
 
   const PiecePoints& surfaces_;

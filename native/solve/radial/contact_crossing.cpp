@@ -28,68 +28,117 @@ bool comes_out(PointsIn ways_out, PointsIn normals) {
          (cosines.maxCoeff() < -against && cosines.minCoeff() < -along);
 }
 
-/// The samples that lie inside where an obstacle crosses the surface, with all that are inside beside them,
-/// and those outside, between which and their neighbours it crosses. `places` are those of the samples,
-/// `distances` theirs from the obstacle.
-std::vector<Index> crossed_samples(const BarrierSurface& obstacle, const ContactPoints& points,
-                                   PointsIn places, const Vector& distances) {
-  std::vector<Index> result;
-  if (obstacle.is_flat() || obstacle.is_sheet()) return result;
-  const double reach = nearby * points.spacing();
-  std::vector<Index> near;
-  for (Index i = 0; i < points.sample_count(); ++i)
-    if (distances[i] < reach) near.push_back(i);
-  if (near.empty()) return result;
-  const Points theirs = rows_of(places, near), rest = points.rest(near);
-  const PointGrid grid(rest, reach);
-  const std::vector<Index> cells = grid.cell_of_each();
-  const Points normals = obstacle.nearest(theirs).normals;
-  const auto is_inside = [&](Index m) { return distances[near[static_cast<std::size_t>(m)]] < 0.0; };
-  const auto each_neighbour = [&](Index m, auto&& take) {
-    grid.near(cells[static_cast<std::size_t>(m)], [&](Index cell) {
-      for (const Index other : grid.rows(cell))
-        if (other != m && (rest.row(other) - rest.row(m)).norm() < reach) take(other);
-    });
-  };
-  std::vector<bool> left(near.size()), seen(near.size());
-  // All that is inside beside m, and what is outside there.
-  const auto leave_part = [&](Index m) {
-    std::vector<Index> part{m}, samples, edge;
-    seen[static_cast<std::size_t>(m)] = true;
-    for (std::size_t next = 0; next < part.size(); ++next) {
-      samples.push_back(near[static_cast<std::size_t>(part[next])]);
-      each_neighbour(part[next], [&](Index other) {
-        if (seen[static_cast<std::size_t>(other)]) return;
-        if (!is_inside(other)) return edge.push_back(other);
-        seen[static_cast<std::size_t>(other)] = true;
-        part.push_back(other);
-      });
-    }
-    if (comes_out(rows_of(normals, part), points.normals(samples))) return;
-    for (const std::vector<Index>* rows : {&part, &edge})
-      for (const Index row : *rows) left[static_cast<std::size_t>(row)] = true;
-  };
-  std::vector<std::pair<Index, Index>> pairs;  // outside, on opposite sides
-  for (Index m = 0; m < std::ssize(near); ++m)
-    each_neighbour(m, [&](Index other) {
-      if (normals.row(m).dot(normals.row(other)) > opposite) return;
-      if (is_inside(m) && !seen[static_cast<std::size_t>(m)])
-        leave_part(m);
-      else if (!is_inside(m) && !is_inside(other) && m < other)
-        pairs.emplace_back(m, other);
-    });
-  std::vector<Index> from, to;
-  for (const auto& [a, b] : pairs) {
-    from.push_back(a);
-    to.push_back(b);
+/// Samples beside an obstacle, where it may cross their surface. Rows count these alone.
+class SamplesBeside {
+ public:
+  /// `places` are those of all samples, `distances` theirs from the obstacle.
+  SamplesBeside(const BarrierSurface& obstacle, const ContactPoints& points, PointsIn places,
+                const Vector& distances);
+  /// Those that lie inside where the obstacle crosses the surface, with all that are inside beside them, and
+  /// those outside, between which and their neighbours it crosses.
+  std::vector<Index> crossed();
+
+ private:
+  static std::vector<Index> nearer(const Vector& distances, double reach);
+  bool is_inside(Index row) const { return distances_[row] < 0.0; }
+  bool are_opposite(Index row, Index other) const {
+    return ways_out_.row(row).dot(ways_out_.row(other)) <= opposite;
   }
+  template <class Take>
+  void each_neighbour(Index row, Take&& take) const;
+  void leave(Index row) { left_[static_cast<std::size_t>(row)] = true; }
+  void leave_part(Index row);
+  void leave_between(const std::vector<Index>& from, const std::vector<Index>& to);
+
+  const BarrierSurface& obstacle_;
+  const ContactPoints& points_;
+  double reach_;
+  std::vector<Index> samples_;
+  Points places_;
+  Points rest_;
+  Vector distances_;
+  Points ways_out_;
+  PointGrid grid_;  // at rest
+  std::vector<Index> cells_;
+  std::vector<bool> left_;  // inside
+  std::vector<bool> seen_;  // as inside
+};
+
+std::vector<Index> SamplesBeside::nearer(const Vector& distances, double reach) {
+  std::vector<Index> samples;
+  for (Index i = 0; i < distances.size(); ++i)
+    if (distances[i] < reach) samples.push_back(i);
+  return samples;
+}
+
+SamplesBeside::SamplesBeside(const BarrierSurface& obstacle, const ContactPoints& points, PointsIn places,
+                             const Vector& distances)
+    : obstacle_(obstacle),
+      points_(points),
+      reach_(nearby * points.spacing()),
+      samples_(nearer(distances, reach_)),
+      places_(rows_of(places, samples_)),
+      rest_(points.rest(samples_)),
+      distances_(entries_of(distances, samples_)),
+      ways_out_(obstacle.nearest(places_).normals),
+      grid_(rest_, reach_),
+      cells_(grid_.cell_of_each()),
+      left_(samples_.size()),
+      seen_(samples_.size()) {}
+
+/// Calls take(other) for the rows beside a row at rest.
+template <class Take>
+void SamplesBeside::each_neighbour(Index row, Take&& take) const {
+  grid_.near(cells_[static_cast<std::size_t>(row)], [&](Index cell) {
+    for (const Index other : grid_.rows(cell))
+      if (other != row && (rest_.row(other) - rest_.row(row)).norm() < reach_) take(other);
+  });
+}
+
+/// Leaves all that is inside beside a row, and what is outside there, unless it comes out whole.
+void SamplesBeside::leave_part(Index row) {
+  std::vector<Index> part{row}, samples, edge;
+  seen_[static_cast<std::size_t>(row)] = true;
+  for (std::size_t next = 0; next < part.size(); ++next) {
+    samples.push_back(samples_[static_cast<std::size_t>(part[next])]);
+    each_neighbour(part[next], [&](Index other) {
+      if (seen_[static_cast<std::size_t>(other)]) return;
+      if (!is_inside(other)) return edge.push_back(other);
+      seen_[static_cast<std::size_t>(other)] = true;
+      part.push_back(other);
+    });
+  }
+  if (comes_out(rows_of(ways_out_, part), points_.normals(samples))) return;
+  for (const std::vector<Index>* rows : {&part, &edge})
+    for (const Index each : *rows) leave(each);
+}
+
+/// Leaves pairs of rows with the obstacle in between.
+void SamplesBeside::leave_between(const std::vector<Index>& from, const std::vector<Index>& to) {
   const std::vector<BarrierSurface::Hit> hits =
-      obstacle.first_hits(rows_of(theirs, from), rows_of(theirs, to));
-  for (std::size_t k = 0; k < pairs.size(); ++k)
-    if (hits[k].share <= 1.0)
-      left[static_cast<std::size_t>(pairs[k].first)] = left[static_cast<std::size_t>(pairs[k].second)] = true;
-  for (Index m = 0; m < std::ssize(near); ++m)
-    if (left[static_cast<std::size_t>(m)]) result.push_back(near[static_cast<std::size_t>(m)]);
+      obstacle_.first_hits(rows_of(places_, from), rows_of(places_, to));
+  for (std::size_t k = 0; k < hits.size(); ++k) {
+    if (hits[k].share > 1.0) continue;
+    leave(from[k]);
+    leave(to[k]);
+  }
+}
+
+std::vector<Index> SamplesBeside::crossed() {
+  std::vector<Index> from, to;  // outside, on opposite sides
+  const Index count = std::ssize(samples_);
+  for (Index row = 0; row < count; ++row)
+    each_neighbour(row, [&](Index other) {
+      if (!are_opposite(row, other)) return;
+      if (is_inside(row) && !seen_[static_cast<std::size_t>(row)]) leave_part(row);
+      if (is_inside(row) || is_inside(other) || row > other) return;
+      from.push_back(row);
+      to.push_back(other);
+    });
+  leave_between(from, to);
+  std::vector<Index> result;
+  for (Index row = 0; row < count; ++row)
+    if (left_[static_cast<std::size_t>(row)]) result.push_back(samples_[static_cast<std::size_t>(row)]);
   return result;
 }
 
@@ -99,9 +148,10 @@ void ContactWays::cross(Index surface, const BarrierSurface& obstacle, const Con
                         PointsIn places) {
   std::vector<bool>& samples = crossed[static_cast<std::size_t>(surface)];
   samples.clear();
+  if (obstacle.is_flat() || obstacle.is_sheet()) return;
   const Index count = points.sample_count();
-  const std::vector<Index> rows =
-      crossed_samples(obstacle, points, places.topRows(count), clear.col(surface).head(count));
+  const Vector distances = clear.col(surface).head(count);
+  const std::vector<Index> rows = SamplesBeside(obstacle, points, places.topRows(count), distances).crossed();
   if (rows.empty()) return;
   samples.assign(static_cast<std::size_t>(count), false);
   for (const Index row : rows) {

@@ -43,6 +43,16 @@ constexpr double outwards = 1.0, inwards = -1.0;
 /// Meshes are so far from each other.
 constexpr double meshes_apart = 10.0;
 
+/// The blocks of a RadialEvaluator that rows in ascending order are in.
+std::vector<Index> blocks_of(const std::vector<Index>& rows) {
+  std::vector<Index> blocks;
+  for (const Index row : rows)
+    if (const Index block = row / RadialEvaluator<float>::block_size;
+        blocks.empty() || blocks.back() != block)
+      blocks.push_back(block);
+  return blocks;
+}
+
 }  // namespace
 
 SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>& rows, double kept) {
@@ -146,6 +156,48 @@ bool SelfContact::came_through(Index i, Index j, const Vec3& normal) const {
          (ways_.seen.row(i) - ways_.seen.row(j)).dot(normal.transpose()) >= 0.0;
 }
 
+/// Whether samples may meet that are near each other now.
+bool SelfContact::may_meet(Index i, Index j) const {
+  return least_[i] > 0.0 && least_[j] > 0.0 && is_far(i, j, far_inside) && !is_cut(i, j);
+}
+
+/// Whether a gap along the normal of the second sample is one of a pair.
+bool SelfContact::is_gap(double gap, Index i, Index j, const Vec3& normal, Beyond beyond) const {
+  switch (beyond) {
+    case Beyond::none:
+      return gap >= 0.0;
+    case Beyond::as_came:
+      return gap >= 0.0 || came_through(i, j, normal);
+    case Beyond::shallow:
+      return gap >= -shallow;
+    default:
+      return true;
+  }
+}
+
+/// The nearest sample of runs that one faces, nearer than `near`; −1: none.
+Index SelfContact::faced_by(Index i, const std::vector<Index>& runs, PointsIn places, const Points& normals,
+                            double near, Beyond beyond) const {
+  if (least_[i] <= 0.0) return -1;
+  const Vec3 place = places.row(i).transpose(), normal = normals.row(i).transpose();
+  Index faced = -1;
+  double nearest = near * near;
+  for (const Index run : runs)
+    for (const Index j : runs_->samples(run)) {
+      const Vec3 arm = place - places.row(j).transpose();
+      const double square = arm.squaredNorm();
+      if (square >= nearest) continue;
+      const Vec3 other = normals.row(j).transpose();
+      if (normal.dot(other) > facing || !may_meet(i, j)) continue;
+      const double gap = arm.dot(other);
+      if (square - gap * gap > aside_ * aside_ || -gap > std::min(widths_[i], widths_[j])) continue;
+      if (!is_gap(gap, i, j, other, beyond)) continue;
+      nearest = square;
+      faced = j;
+    }
+  return faced;
+}
+
 std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& normals_at, double near,
                                             Beyond beyond) {
   Points areas;  // known at once where they are needed everywhere, as they are below
@@ -153,7 +205,7 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
   Points normals = unit_rows(areas);
   const std::vector<std::vector<Index>> near_to =
       runs_->meeting(places, normals, least_.array() > 0.0, near, facing);
-  std::vector<Index> runs, samples, blocks;
+  std::vector<Index> runs, samples;
   for (Index run = 0; run < runs_->count(); ++run) {
     if (near_to[static_cast<std::size_t>(run)].empty()) continue;
     runs.push_back(run);
@@ -161,61 +213,39 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
   }
   if (runs.empty()) return {};
   std::sort(samples.begin(), samples.end());
-  for (const Index i : samples)
-    if (const Index block = i / RadialEvaluator<float>::block_size; blocks.empty() || blocks.back() != block)
-      blocks.push_back(block);
   if (normals.rows() == 0) {
+    const std::vector<Index> blocks = blocks_of(samples);
     normals = normals_at(&blocks);
     for (const Index i : samples) normals.row(i).normalize();
   }
-  std::vector<Index> second(static_cast<std::size_t>(places.rows()), -1);
-  const auto visit = [&](Index i, const std::vector<Index>& others, Beyond which) {
-    second[static_cast<std::size_t>(i)] = -1;
-    if (least_[i] <= 0.0) return;
-    const Vec3 place = places.row(i).transpose(), normal = normals.row(i).transpose();
-    double nearest = near * near;
-    for (const Index run : others)
-      for (const Index j : runs_->samples(run)) {
-        const Vec3 arm = place - places.row(j).transpose();
-        const double square = arm.squaredNorm();
-        if (square >= nearest) continue;
-        const Vec3 other = normals.row(j).transpose();
-        if (normal.dot(other) > facing || least_[j] <= 0.0 || !is_far(i, j, far_inside) || is_cut(i, j))
-          continue;
-        const double gap = arm.dot(other);
-        if (square - gap * gap > aside_ * aside_ || -gap > std::min(widths_[i], widths_[j])) continue;
-        const double least = which == Beyond::shallow ? -shallow : 0.0;
-        if (gap < least && which < Beyond::all && !(which == Beyond::as_came && came_through(i, j, other)))
-          continue;
-        nearest = square;
-        second[static_cast<std::size_t>(i)] = j;
-      }
-  };
-  const auto each = [&](const auto& look) {
+  std::vector<Index> faced(static_cast<std::size_t>(places.rows()), -1);
+  const auto look = [&](Beyond which, const auto& wanted) {
     parallel_for(0, std::ssize(runs), 32, [&](Index first, Index last) {
       for (Index k = first; k < last; ++k) {
         const Index run = runs[static_cast<std::size_t>(k)];
-        for (const Index i : runs_->samples(run)) look(i, near_to[static_cast<std::size_t>(run)]);
+        for (const Index i : runs_->samples(run))
+          if (wanted(i))
+            faced[static_cast<std::size_t>(i)] =
+                faced_by(i, near_to[static_cast<std::size_t>(run)], places, normals, near, which);
       }
     });
   };
-  each([&](Index i, const std::vector<Index>& others) { visit(i, others, beyond); });
+  look(beyond, [](Index) { return true; });
   const auto is_beyond = [&](Index i) {
-    const Index j = second[static_cast<std::size_t>(i)];
+    const Index j = faced[static_cast<std::size_t>(i)];
     return j >= 0 && normals.row(j).dot(places.row(i) - places.row(j)) < 0.0;
   };
   is_beyond_ = beyond != Beyond::at_rest && std::any_of(samples.begin(), samples.end(), is_beyond);
   if (is_beyond_) {
     if (areas.rows() == 0) areas = normals_at(nullptr);
     const SampleWindings now(places, share_ * areas, aside_);
-    each([&](Index i, const std::vector<Index>& others) {  // the two sides of what is squashed do not meet
-      if (is_beyond(i) && winding(now, i, outwards, places, areas) - above_[i] < entered)
-        visit(i, others, Beyond::none);
+    look(Beyond::none, [&](Index i) {  // the two sides of what is squashed do not meet
+      return is_beyond(i) && winding(now, i, outwards, places, areas) - above_[i] < entered;
     });
   }
   std::vector<FacingPair> pairs;
   for (const Index i : samples) {
-    const Index j = second[static_cast<std::size_t>(i)];
+    const Index j = faced[static_cast<std::size_t>(i)];
     if (j < 0) continue;
     const Vec3 normal = normals.row(j).transpose();
     pairs.push_back({i, j, normal, normal.dot((places.row(i) - places.row(j)).transpose()),

@@ -51,9 +51,14 @@ class SelfContact {
   std::vector<FacingPair> search(PointsIn places, const Normals& normals, double near, Beyond beyond);
   bool is_far(Index i, Index j, double distance) const;
   bool is_cut(Index i, Index j) const;
+  bool may_meet(Index i, Index j) const;
   bool came_through(Index i, Index j, const Vec3& normal) const;
+  bool is_gap(double gap, Index i, Index j, const Vec3& normal, Beyond beyond) const;
+  Index faced_by(Index i, const std::vector<Index>& runs, PointsIn places, const Points& normals, double near,
+                 Beyond beyond) const;
   double winding(const SampleWindings& windings, Index i, double side, PointsIn places,
                  PointsIn normals) const;
+  Vector below(const SampleWindings& windings, PointsIn places, PointsIn normals) const;
   void measure_rest(PointsIn places);
   void find_cuts(PointsIn places);
   void remember(PointsIn places, const std::vector<FacingPair>& pairs);
@@ -64,8 +69,6 @@ class SelfContact {
   bool is_cut_ = false;  // whether parts cut each other at rest
   std::optional<FacingRuns> runs_;
   std::vector<std::int32_t> meshes_;
-  Vector below(const SampleWindings& windings, PointsIn places, PointsIn normals) const;
-
   Points cuts_;                // (n,3) nearest places at rest that are inside another part; empty: none
   std::vector<Index> probes_;  // rows below which windings are taken
   Vector below_;               // windings there at rest

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "solve/radial/handle_bounds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+#include "fields/radial_evaluator.h"
+#include "sampling/oriented_points.h"
+#include "sampling/sample_choice.h"
+#include "solve/radial/contact_forces.h"
+#include "solve/radial/handle_motion.h"
+
+namespace arapfields {
+namespace {
+
+/// Sweeps over the planes of a handle, and the change, in cube units, below which these end.
+constexpr int most_sweeps = 200;
+constexpr double settled = 1e-6;
+/// What lies under a point handle, in widths of the shape there: no farther from it at rest, nor aside of it
+/// as seen along a plane's normal.
+constexpr double under = 1.5, aside = 0.35;
+/// A handle that has moved less than that, in cube units, is as good as at rest.
+constexpr double unmoved = 1e-3;
+/// Searches for the thickest part of the shape beside a point handle, which may lie at an edge.
+constexpr int thicker = 3;
+/// Planes of solids turn as long as the translation changes by more, in cube units, but so many times at
+/// most.
+constexpr int most_turns = 6;
+constexpr double turned_enough = 1e-4;
+/// Those that it ends so far from, in cube units, stay; so do those whose normal would be of another side.
+constexpr double near_bound = 0.05, same_side = 0.0;
+
+/// How little each handle gives way to others: what holds more, and what has moved less.
+Vector masses_of(const BoundHandles& handles) {
+  Vector masses(handles.count());
+  for (Index i = 0; i < handles.count(); ++i) {
+    const Index begin = handles.begin(i), rows = handles.begin(i + 1) - begin;
+    const Points way = handles.targets().middleRows(begin, rows) - handles.sources().middleRows(begin, rows);
+    masses[i] = static_cast<double>(rows) / (way.rowwise().squaredNorm().mean() + unmoved * unmoved);
+  }
+  return masses;
+}
+
+/// The handle that holds each of the problem's samples; −1: none.
+const std::vector<Index>& holders(RadialState& s) {
+  return s.holders.get({s.handles.revision()}, [&] {
+    const BoundHandles& handles = s.handles.bound();
+    std::vector<Index> result(static_cast<std::size_t>(s.problem.samples.size()), -1);
+    for (Index i = 0; i < handles.count(); ++i)
+      for (Index pair = handles.begin(i); pair < handles.begin(i + 1); ++pair)
+        if (const Index sample = handles.members()[static_cast<std::size_t>(pair)]; sample >= 0)
+          result[static_cast<std::size_t>(sample)] = i;
+    return result;
+  });
+}
+
+/// Twice the thickness of what is no farther than that from each of the points.
+Vector widths_at(const RadialProblem& problem, const Points& points) {
+  const Vector thickness = problem.shape->thickness->at(problem.surface());
+  Vector widths = 2.0 * problem.shape->thickness->at(points);
+  for (Index k = 0; k < points.rows(); ++k) {
+    const Vector squares = (problem.surface().rowwise() - points.row(k)).rowwise().squaredNorm();
+    for (int search = 0; search < thicker; ++search) {
+      const double square = widths[k] * widths[k];
+      for (Index i = 0; i < squares.size(); ++i)
+        if (squares[i] < square) widths[k] = std::max(widths[k], 2.0 * thickness[i]);
+    }
+  }
+  return widths;
+}
+
+const std::vector<Index>& mirrored(RadialState& s) {
+  return s.mirrored.get({1}, [&] {
+    const Points& samples = s.problem.surface();
+    const Points alike = Points::Zero(samples.rows(), 3);
+    return OrientedPoints(samples, alike).nearest(s.problem.mirror->reflected(samples), alike, 0.0);
+  });
+}
+
+}  // namespace
+
+HandleBounds::HandleBounds(RadialState& state, const std::vector<Mat4>& motions)
+    : state_(state), motions_(motions), holders_(holders(state)), bounds_(motions.size()) {
+  if (state.contact.itself()) masses_ = masses_of(state.handles.bound());
+  pins_ = pins();
+  if (!pins_.empty()) places_ = contact_places(state);
+  for (const ContactPlane& plane : state.contact.found().planes) {
+    bind(plane, false);
+    // What a symmetric field keeps beyond a plane, it keeps beyond the plane's reflection.
+    if (state.problem.mirror) bind(plane, true);
+  }
+}
+
+std::vector<HandleBounds::Pin> HandleBounds::pins() const {
+  RadialState& s = state_;
+  const BoundHandles& handles = s.handles.bound();
+  std::vector<Index> rows, of;
+  for (Index i = 0; i < handles.count(); ++i)
+    if (handles.handle(i).kind == Handle::Kind::point) rows.push_back(handles.begin(i)), of.push_back(i);
+  if (rows.empty()) return {};
+  const Points rest = rows_of(handles.sources(), rows);
+  const Points now = radial_rows(s.problem.basis, rest, JetOrder::value) * s.shape.coefficients;
+  const Vector& widths = s.pin_widths.get({s.handles.revision()}, [&] { return widths_at(s.problem, rest); });
+  std::vector<Pin> result;
+  for (std::size_t k = 0; k < of.size(); ++k) {
+    const auto row = static_cast<Index>(k);
+    const Mat4& motion = motions_[static_cast<std::size_t>(of[k])];
+    result.push_back(
+        {of[k], rest.row(row), now.row(row), affine_image(rest.row(row), motion).row(0), widths[row]});
+  }
+  return result;
+}
+
+/// How far a pin's target lies beyond a plane for what is under it to keep its length; −∞: not under it.
+double HandleBounds::beyond(const Pin& pin, const Vec3& normal, double offset, const Place& place) {
+  const double length = (place.rest - pin.rest).norm();
+  const Vec3 arm = place.now - pin.now;
+  const double along = normal.dot(arm);
+  if (length > under * pin.width || (arm - along * normal).norm() > aside * pin.width)
+    return -std::numeric_limits<double>::infinity();
+  const double longer = arm.norm() > 0.0 ? length / arm.norm() : 1.0;
+  return offset - normal.dot(pin.target) - longer * along;
+}
+
+Vec3 HandleBounds::turned(Vec3 arm, bool over) const {
+  if (over) arm[state_.problem.mirror->axis] *= -1.0;
+  return arm;
+}
+
+HandleBounds::Place HandleBounds::place_of(Index row, bool over) const {
+  Index sample = state_.contact.sample_of(row);
+  if (over) sample = mirrored(state_)[static_cast<std::size_t>(sample)];
+  return {turned(state_.contact.found().places.row(row), over),
+          pins_.empty() ? Vec3(Vec3::Zero()) : turned(places_.row(row), over),
+          holders_[static_cast<std::size_t>(sample)]};
+}
+
+Vec3 HandleBounds::target_of(const Place& place) const {
+  return affine_image(place.rest.transpose(), motions_[static_cast<std::size_t>(place.holder)]).row(0);
+}
+
+void HandleBounds::bind(const ContactPlane& plane, bool over) {
+  const Vec3 normal = turned(plane.normal, over);
+  const Place first = place_of(plane.first, over);
+  if (plane.second < 0) return bind_to_surface(plane, normal, first, over);
+  bind_to_itself(plane, normal, first, place_of(plane.second, over));
+}
+
+void HandleBounds::bind_to_surface(const ContactPlane& plane, const Vec3& normal, const Place& place,
+                                   bool over) {
+  for (const Pin& pin : pins_)
+    if (const double depth = beyond(pin, normal, plane.offset, place); depth > -pin.width)
+      bounds_of(pin.handle).push_back({normal, depth, plane.obstacle});
+  if (place.holder < 0) return;
+  const Vec3 target = target_of(place);
+  bounds_of(place.holder)
+      .push_back({normal, plane.offset - normal.dot(target), plane.obstacle, target, over});
+}
+
+/// Of two handles the lighter gives way.
+void HandleBounds::bind_to_itself(const ContactPlane& plane, const Vec3& normal, const Place& first,
+                                  const Place& second) {
+  if (first.holder < 0 || second.holder < 0 || first.holder == second.holder) return;
+  const double depth = plane.offset - normal.dot(target_of(first) - target_of(second));
+  const double own = masses_[second.holder] / (masses_[first.holder] + masses_[second.holder]);
+  bounds_of(first.holder).push_back({normal, own * depth, plane.obstacle});
+  bounds_of(second.holder).push_back({-normal, (1.0 - own) * depth, plane.obstacle});
+}
+
+/// By the method of Hildreth (1957).
+std::pair<Vec3, Index> HandleBounds::within(const std::vector<Bound>& bounds) {
+  Vec3 way = Vec3::Zero();
+  std::vector<double> pushes(bounds.size(), 0.0);
+  double change = settled;
+  for (int sweep = 0; sweep < most_sweeps && change >= settled; ++sweep) {
+    change = 0.0;
+    for (std::size_t k = 0; k < bounds.size(); ++k) {
+      const double next = std::max(0.0, pushes[k] + bounds[k].depth - bounds[k].normal.dot(way));
+      way += (next - pushes[k]) * bounds[k].normal;
+      change = std::max(change, std::abs(next - pushes[k]));
+      pushes[k] = next;
+    }
+  }
+  const auto most = std::max_element(pushes.begin(), pushes.end());
+  return {way, most == pushes.end() || *most == 0.0
+                   ? -1
+                   : bounds[static_cast<std::size_t>(most - pushes.begin())].surface};
+}
+
+/// Where a translation would take what a handle holds, curved solids have other planes than where it is now.
+/// Whether any bound has become another one.
+bool HandleBounds::turn(std::vector<Bound>& bounds, const Vec3& way) const {
+  const RadialState& s = state_;
+  bool any = false;
+  for (Index k = 0; k < std::ssize(s.contact.surfaces()); ++k) {
+    const BarrierSurface& surface = s.contact.surfaces()[static_cast<std::size_t>(k)];
+    if (surface.is_flat() || surface.is_sheet()) continue;
+    std::vector<Bound*> of;
+    for (Bound& bound : bounds)
+      if (bound.surface == k && bound.target && bound.normal.dot(way) - bound.depth < near_bound)
+        of.push_back(&bound);
+    if (of.empty()) continue;
+    Points places(std::ssize(of), 3);
+    for (std::size_t m = 0; m < of.size(); ++m)
+      places.row(static_cast<Index>(m)) = turned(*of[m]->target + way, of[m]->over).transpose();
+    const BarrierSurface::Nearest there = surface.nearest(places);
+    for (std::size_t m = 0; m < of.size(); ++m) {
+      const auto row = static_cast<Index>(m);
+      const Vec3 normal = turned(there.normals.row(row).transpose(), of[m]->over);
+      if (normal.dot(of[m]->normal) < same_side) continue;
+      of[m]->normal = normal;
+      of[m]->depth = normal.dot(way) - there.distances[row] + surface.margin() + ContactTerms::kept;
+      any = true;
+    }
+  }
+  return any;
+}
+
+std::pair<Vec3, Index> HandleBounds::least_translation(Index handle) {
+  std::vector<Bound>& bounds = bounds_of(handle);
+  auto [way, surface] = within(bounds);
+  for (int turns = 0; surface >= 0 && turns < most_turns && turn(bounds, way); ++turns) {
+    const Vec3 last = way;
+    std::tie(way, surface) = within(bounds);
+    if ((way - last).norm() < turned_enough) break;
+  }
+  return {way, surface};
+}
+
+}  // namespace arapfields
