@@ -18,36 +18,26 @@ EXPORTS = {".abc": "ABC", ".usdc": "USD", ".glb": "GLTF"}
 
 def run_bake(options, _):
     """Exit code 0 when every object's frames are done, or this part of them; 1 when one failed."""
-    if options.input.suffix.lower() != ".blend":
-        raise UserError(f"{options.input}: is no .blend; a scene is baked as it is")
-    suffix = options.output.suffix.lower() if options.output else ""
-    if suffix not in ("", ".blend", *EXPORTS):
-        known = ", ".join((".blend", *EXPORTS))
-        raise UserError(f"{options.output}: unknown extension; known are {known}")
-    if suffix in EXPORTS and options.shard:
-        raise UserError("--shard: an exported file has no parts; bake the parts first, then export")
+    suffix = required_suffix(options)
     target = options.output.resolve() if options.output else None
     folder = options.folder.resolve() if options.folder else None
     files.read(options.input)
     for place in (target, folder / "cache" if folder and folder.parent.is_dir() else None):
         if place:
             files.check_place(place)
-    sources = objects_to_solve(options) if options.objects else animated(options)
-    given = {"kind": options.kind.upper()} if options.kind else {}
-    if options.frames:
-        given["start"], given["end"] = options.frames
-    given |= {name: getattr(options, name) for name in ("step", "subframes") if getattr(options, name)}
-    choose(sources)
+    choose(objects_to_solve(options) if options.objects else animated(options))
     with progress(options.quiet):
         if suffix in EXPORTS:
-            call, further = bpy.ops.arapfields.export_animation, {"filepath": str(target)}
-            further["format"] = EXPORTS[suffix]
+            reason = failure(
+                bpy.ops.arapfields.export_animation,
+                **frames(options),
+                filepath=str(target),
+                format=EXPORTS[suffix],
+            )
         else:
-            call, further = bpy.ops.arapfields.bake, {"format": options.format.upper()}
-            further["part"] = options.shard or (1, 1)
-            if folder:
-                further["folder"] = str(folder)
-        reason = failure(call, scope="SELECTED", **given, **further)
+            caches = {"format": options.format.upper(), "part": options.shard or (1, 1)}
+            caches |= {"folder": str(folder)} if folder else {}
+            reason = failure(bpy.ops.arapfields.bake, **frames(options), **caches)
     if reason and not jobs.messages():
         raise UserError(reason)
     for level, text in jobs.messages():
@@ -56,6 +46,29 @@ def run_bake(options, _):
         files.write(target, [])
     failed = any(level != "INFO" for level, _ in jobs.messages())
     return 1 if reason or failed else 0
+
+
+def required_suffix(options):
+    """Of the output, "" without one; UserError where it is unknown, or the input is no scene."""
+    if options.input.suffix.lower() != ".blend":
+        raise UserError(f"{options.input}: is no .blend; a scene is baked as it is")
+    suffix = options.output.suffix.lower() if options.output else ""
+    if suffix not in ("", ".blend", *EXPORTS):
+        known = ", ".join((".blend", *EXPORTS))
+        raise UserError(f"{options.output}: unknown extension; known are {known}")
+    if suffix in EXPORTS and options.shard:
+        raise UserError("--shard: an exported file has no parts; bake the parts first, then export")
+    return suffix
+
+
+def frames(options):
+    """What is baked of the selected objects, as arguments of the operators."""
+    given = {"scope": "SELECTED"}
+    if options.kind:
+        given["kind"] = options.kind.upper()
+    if options.frames:
+        given["start"], given["end"] = options.frames
+    return given | {name: value for name in ("step", "subframes") if (value := getattr(options, name))}
 
 
 def animated(options):

@@ -47,6 +47,32 @@ def add_flags(parser):
 
 
 def run(args):
+    require_pairs(args)
+    with Outputs() as outputs:
+        keys, arrays = output_places(args, outputs)
+        meshes = files.read_mesh(args.source), files.read_mesh(args.target)
+        field = files.read_mesh(args.field)[0] if files.is_mesh(args.field) else files.read_field(args.field)
+        places = with_progress(
+            "transfer",
+            lambda task: af.Correspondence(field, *meshes, back=args.back, task=task),
+            args.quiet,
+        )
+        giving, receiving = reversed(meshes) if args.back else meshes
+        for key, output in keys.items():
+            offsets = places.displacements(shape_of(key, giving) - giving[0])
+            write_key(outputs, output, receiver(args), receiving, offsets)
+        if args.values:
+            carried = {name: places.values(array) for name, array in read_values(args.values).items()}
+            write_named(outputs, arrays["--values-output"], carried)
+        if args.places:
+            found = {name: getattr(places, name) for name in ("triangles", "shares", "distances")}
+            write_named(outputs, arrays["--places"], found)
+    written = [*keys.values(), *arrays.values()]
+    verbs.summary(args, "wrote " + ", ".join(map(str, written)))
+
+
+def require_pairs(args):
+    """InvalidInput where a flag lacks its other, or there is no output."""
     for given, other, flags in (
         (args.keys, args.into, "--keys and --into"),
         (args.values, args.values_output, "--values and --values-output"),
@@ -55,58 +81,46 @@ def run(args):
             raise af.InvalidInput(f"{flags} need each other")
     if not (args.into or args.values or args.places):
         raise af.InvalidInput("no output: give --into, --values-output or --places")
-    with Outputs() as outputs:
-        receiver = args.source if args.back else args.target
-        suffix = Path(receiver).suffix.lower()
-        keys = [
-            (
-                key,
-                outputs.check(
-                    Path(args.into) / f"{Path(key).stem}{suffix}", files.MESH_SUFFIXES, f"--keys {key}"
-                ),
-            )
-            for key in args.keys
-        ]
-        arrays = {
-            flag: outputs.check(path, suffixes, flag)
-            for flag, path, suffixes in (
-                ("--values-output", args.values_output, (".npz",)),
-                ("--places", args.places, (".npz", ".json")),
-            )
-            if path
-        }
-        source, target = files.read_mesh(args.source), files.read_mesh(args.target)
-        field = files.read_mesh(args.field)[0] if files.is_mesh(args.field) else files.read_field(args.field)
-        places = with_progress(
-            "transfer",
-            lambda task: af.Correspondence(field, source, target, back=args.back, task=task),
-            args.quiet,
-        )
-        giving, receiving = (target, source) if args.back else (source, target)
-        for key, output in keys:
-            offsets = places.displacements(shape_of(key, giving) - giving[0])
-            outputs.write(
-                output,
-                lambda path, moved=offsets: files.write_moved_mesh(
-                    path, receiver, receiving, lambda rest: moved_rows(rest, receiving[0], moved)
-                ),
-            )
-        if args.values:
-            carried = {name: places.values(array) for name, array in read_values(args.values).items()}
-            outputs.write(arrays["--values-output"], lambda path: write_arrays(path, **carried))
-        if args.places:
-            found = {name: getattr(places, name) for name in ("triangles", "shares", "distances")}
-            as_json = arrays["--places"].suffix.lower() == ".json"
-            outputs.write(
-                arrays["--places"],
-                lambda path: (
-                    path.write_text(json_text(found) + "\n", encoding="utf-8")
-                    if as_json
-                    else write_arrays(path, **found)
-                ),
-            )
-    written = [str(output) for _, output in keys] + [str(path) for path in arrays.values()]
-    verbs.summary(args, "wrote " + ", ".join(written))
+
+
+def receiver(args):
+    """The file of the mesh that something is carried over to."""
+    return args.source if args.back else args.target
+
+
+def output_places(args, outputs):
+    """Where each key goes, by its file, and where arrays go, by flags."""
+    suffix = Path(receiver(args)).suffix.lower()
+    keys = {}
+    for key in args.keys:
+        place = Path(args.into) / f"{Path(key).stem}{suffix}"
+        keys[key] = outputs.check(place, files.MESH_SUFFIXES, f"--keys {key}")
+    wanted = {
+        "--values-output": (args.values_output, (".npz",)),
+        "--places": (args.places, (".npz", ".json")),
+    }
+    arrays = {flag: outputs.check(path, known, flag) for flag, (path, known) in wanted.items() if path}
+    return keys, arrays
+
+
+def write_key(outputs, place, path, mesh, offsets):
+    """The mesh of a file with its vertices moved."""
+
+    def moved(rest):
+        if len(rest) != len(mesh[0]):
+            raise af.InvalidInput(f"{len(rest)} vertices are to be written, and {len(mesh[0])} were read")
+        return rest + offsets
+
+    outputs.write(place, lambda output: files.write_moved_mesh(output, path, mesh, moved))
+
+
+def write_named(outputs, place, arrays):
+    """Arrays by their names, as the suffix says."""
+    if place.suffix.lower() == ".json":
+        text = json_text(arrays) + "\n"
+        outputs.write(place, lambda output: output.write_text(text, encoding="utf-8"))
+    else:
+        outputs.write(place, lambda output: write_arrays(output, **arrays))
 
 
 def shape_of(path, giving):
@@ -115,12 +129,6 @@ def shape_of(path, giving):
     if len(vertices) != len(giving[0]):
         raise af.InvalidInput(f"{path}: {len(vertices)} vertices; the mesh has {len(giving[0])}")
     return vertices
-
-
-def moved_rows(rest, vertices, offsets):
-    if len(rest) != len(vertices):
-        raise af.InvalidInput(f"{len(rest)} vertices are to be written, and {len(vertices)} were read")
-    return rest + offsets
 
 
 def read_values(path):

@@ -17,29 +17,14 @@ ONE_TARGET = ("landmark", "landmarks", "save_field", "suggest")  # flags of whic
 
 def run(args, options):
     """Wraps each file; InvalidInput at the end where some failed."""
-    for name in ONE_TARGET:
-        if getattr(args, name):
-            raise af.InvalidInput(f"--{name.replace('_', '-')}: {args.target} is a folder; wrap one by one")
-    output, template = Path(args.output or ""), existing_file(args.input, files.MESH_SUFFIXES)
-    if (
-        not args.output
-        or output.suffix
-        or output.is_file()
-        or (output.is_dir() and output.samefile(args.target))
-    ):
-        raise af.InvalidInput("--output: another folder is needed where the target is one")
-    everything = sorted(p for p in Path(args.target).iterdir() if p.suffix.lower() in sources.SOURCES)
-    if not everything:
-        raise af.InvalidInput(f"{args.target}: holds no mesh")
-    names = [path.stem for path in everything]
-    if twins := sorted({name for name in names if names.count(name) > 1}):
-        raise af.InvalidInput(f"{args.target}: {twins[0]} is there twice, with different extensions")
-    number, parts = args.shard or (1, 1)
+    output, template = output_folder(args), existing_file(args.input, files.MESH_SUFFIXES)
+    everything = meshes_in(args.target)
     output.mkdir(parents=True, exist_ok=True)
     source = sources.Source(args)
     samples = sources.samples(source, given(args, "wrap", "samples"), options.seed, args)
     common = made_of(samples, options, template.read_bytes())
     done, failed = {}, []
+    number, parts = args.shard or (1, 1)
     for path in everything[number - 1 :: parts]:
         place = output / f"{path.stem}{template.suffix.lower()}"
         mark = common.copy()
@@ -57,6 +42,29 @@ def run(args, options):
     if done:
         write_sheet(output, everything, template.suffix.lower())
     refuse(failed, len(done) + len(failed))
+
+
+def output_folder(args):
+    """Where the wrapped meshes go; InvalidInput for flags that a folder cannot have."""
+    for name in ONE_TARGET:
+        if getattr(args, name):
+            raise af.InvalidInput(f"--{name.replace('_', '-')}: {args.target} is a folder; wrap one by one")
+    output = Path(args.output or "")
+    is_file = output.suffix or output.is_file()
+    if not args.output or is_file or (output.is_dir() and output.samefile(args.target)):
+        raise af.InvalidInput("--output: another folder is needed where the target is one")
+    return output
+
+
+def meshes_in(folder):
+    """The files of a folder that are meshes, each with a name of its own."""
+    everything = sorted(p for p in Path(folder).iterdir() if p.suffix.lower() in sources.SOURCES)
+    if not everything:
+        raise af.InvalidInput(f"{folder}: holds no mesh")
+    names = [path.stem for path in everything]
+    if twins := sorted({name for name in names if names.count(name) > 1}):
+        raise af.InvalidInput(f"{folder}: {twins[0]} is there twice, with different extensions")
+    return everything
 
 
 def refuse(failed, count):

@@ -72,58 +72,66 @@ def run(args):
     options = given_options(af.WrapOptions, args)
     if args.sequence:
         wrap_sequence.run(args, options, given_pairs(args))
-        return
-    if Path(args.target).is_dir():
+    elif Path(args.target).is_dir():
         wrap_folder.run(args, options)
-        return
-    if args.shard:
+    elif args.shard:
         raise af.InvalidInput(f"--shard: {args.target} is no folder")
+    else:
+        run_one(args, options)
+
+
+def run_one(args, options):
+    """One mesh onto one target."""
     with Outputs() as outputs:
-        places = {
-            flag: outputs.check(path, suffixes, flag)
-            for flag, path, suffixes in (
-                ("--output", args.output, files.MESH_SUFFIXES),
-                ("--save-field", args.save_field, files.STATE_SUFFIXES),
-                ("--suggest", args.suggest, LANDMARKS),
-            )
-            if path is not None
-        }
-        if not places:
-            raise af.InvalidInput("no output: give --output, --save-field or --suggest")
-        report = verbs.report_place(outputs, args)
-        if report is not None and not places.keys() - {"--suggest"}:
-            raise af.InvalidInput("--report: give --output or --save-field, of which it tells")
+        places, report = output_places(args, outputs)
         pairs = given_pairs(args)
         source = sources.Source(args)
         if source.mesh is None and "--output" in places:
             raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --save-field")
         target = sources.read_distance(args.target)
         samples = sources.samples(source, given(args, "wrap", "samples"), options.seed, args)
-        if "--suggest" in places:
+        if place := places.get("--suggest"):
             found = with_progress(
                 "suggest",
                 lambda task: af.suggest_landmarks(samples, target, options=options, task=task),
                 args.quiet,
             )
-            outputs.write(
-                places["--suggest"], lambda path: write_landmarks(path, places["--suggest"].suffix, found)
-            )
+            outputs.write(place, lambda path: write_landmarks(path, place.suffix, found))
         field = None
-        if places.keys() - {"--suggest"}:
+        if wraps(places):
             field = with_progress(
                 "wrap", lambda task: af.wrap(samples, target, pairs, options, task=task), args.quiet
             )
-        if "--output" in places:
-            outputs.write(
-                places["--output"],
-                lambda path: files.write_moved_mesh(path, source.path, source.mesh, field),
-            )
-        if "--save-field" in places:
-            outputs.write(places["--save-field"], field.save)
-        if field is not None:
             verbs.write_report(outputs, report, field.report)
+        if place := places.get("--output"):
+            outputs.write(place, lambda path: files.write_moved_mesh(path, source.path, source.mesh, field))
+        if place := places.get("--save-field"):
+            outputs.write(place, field.save)
     written = "wrote " + ", ".join(str(path) for path in places.values())
     verbs.summary(args, written, field.report if field is not None else None)
+
+
+def output_places(args, outputs):
+    """Where each output goes, by its flag, and the report; InvalidInput where there is none."""
+    wanted = {
+        "--output": (args.output, files.MESH_SUFFIXES),
+        "--save-field": (args.save_field, files.STATE_SUFFIXES),
+        "--suggest": (args.suggest, LANDMARKS),
+    }
+    places = {
+        flag: outputs.check(path, known, flag) for flag, (path, known) in wanted.items() if path is not None
+    }
+    if not places:
+        raise af.InvalidInput("no output: give --output, --save-field or --suggest")
+    report = verbs.report_place(outputs, args)
+    if report is not None and not wraps(places):
+        raise af.InvalidInput("--report: give --output or --save-field, of which it tells")
+    return places, report
+
+
+def wraps(places):
+    """Whether one of the outputs needs the wrap itself."""
+    return bool(places.keys() - {"--suggest"})
 
 
 def given_pairs(args):
