@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import bpy
 
 from ..blender import modifier_stack
-from ..blender.evaluation import depsgraph_of
+from ..blender.evaluation import depsgraph_of, world_matrix
 from ..blender.language import translated
 from ..blender.native_options import options_of
 from ..blender.object_references import ObjectReference, owner_of, settings_of
@@ -122,7 +122,7 @@ class WrapBake(ObjectBake):
     def request(self, context):
         try:
             source, frame = self.reference.get(), context.scene.frame_current
-            space = space_of(source.matrix_world, source.name)
+            space = space_of(world_matrix(source), source.name)
             scan = landmarks.target_of(source) if self.scans is None else scan_at(frame, self.scans)
             self.reader.carrying.expect_motion()
             self.reader.refresh_carried(context)

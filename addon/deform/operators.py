@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender.evaluation import world_matrix
 from ..blender.language import about
 from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
@@ -42,7 +43,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         values = effective_values(DEFORM, settings_of(source).deform, self)
         af = native.library()
         options = options_of("deform", values)
-        handles = empties.solve_handles(source, space_of(source.matrix_world, source.name), weights)
+        handles = empties.solve_handles(source, space_of(world_matrix(source), source.name), weights)
 
         contact = for_job(context, source)
         require_reach_supported(handles, values)

@@ -46,8 +46,9 @@ def lost_bone(source):
 
 def require_handles(source):
     """Why a source's handles cannot be followed, as a UserError; None where they can."""
-    if lost_bone(source):
-        return lost_bone(source)
+    reason = lost_bone(source) or movers.frozen(used(source))
+    if reason is not None:
+        return reason
     if not used(source):
         return UserError("Drag a pin or add a handle first")
     return vertex_groups.missing(source, group_names(source))

@@ -8,6 +8,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..blender import mesh_arrays, modifier_stack
+from ..blender.evaluation import is_driven
 from ..blender.object_references import settings_of
 from ..core.geometry.box_fit import followed_box
 from ..core.geometry.spaces import inverse, transform
@@ -64,6 +65,4 @@ def seen(context, source):
 
 def is_free(empty):
     """Whether an Empty's place is its own."""
-    data = empty.animation_data
-    driven = data is not None and (data.action or data.drivers or data.nla_tracks)
-    return empty.library is None and empty.override_library is None and not driven and not empty.constraints
+    return empty.library is None and empty.override_library is None and not is_driven(empty)

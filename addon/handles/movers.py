@@ -3,15 +3,34 @@
 
 import numpy as np
 
+from ..blender.evaluation import is_disabled, is_moved, world_matrix
 from ..blender.object_references import in_scene, settings_of
+from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix
 from ..names import BONE_NUMBER
 
 
 def matrix_of(item, bone=""):
     """(4, 4) the world matrix of an object, or of its posed bone of that name."""
-    matrix = np.array(item.matrix_world, dtype=np.float64)
+    matrix = np.array(world_matrix(item), dtype=np.float64)
     return matrix @ np.array(item.pose.bones[bone].matrix, dtype=np.float64) if bone else matrix
+
+
+def is_frozen(item):
+    """Whether an object moves, but is disabled, so that Blender does not move it."""
+    parent = item.parent
+    return is_disabled(item) and (is_moved(item) or (parent is not None and is_frozen(parent)))
+
+
+def frozen(entries):
+    """The UserError that names a handle whose Empty is so; None where all of them go on."""
+    for entry in entries:
+        if entry.kind != "BONE" and is_frozen(entry.empty):
+            return UserError(
+                "{name} is disabled in viewports, so that nothing moves it; hide it by its eye instead",
+                entry.empty,
+            )
+    return None
 
 
 def rest_of(entry):

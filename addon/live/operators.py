@@ -10,6 +10,7 @@ from ..core.errors import UserError
 from ..core.runtime import jobs, native
 from ..core.settings.choices import LIVE_KINDS
 from ..handles import empties
+from ..handles.movers import frozen
 from ..jobs.job_operator import busy
 from ..results.placement import placement_refusal
 from ..solver import style_settings
@@ -46,7 +47,8 @@ class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
         try:
             if self.kind == "DEFORM" and not empties.used(source):
                 raise UserError("{name} has no handle; add one in the panel's Handles section", source)
-            reason = style_settings.refusal(source) if self.kind == "STYLIZE" else None
+            is_style = self.kind == "STYLIZE"
+            reason = style_settings.refusal(source) if is_style else frozen(empties.used(source))
             if reason is not None:
                 raise reason
             context.view_layer.update()

@@ -4,7 +4,7 @@
 import numpy as np
 
 from ..blender import modifier_stack
-from ..blender.evaluation import depsgraph_of
+from ..blender.evaluation import depsgraph_of, world_matrix
 from ..blender.mesh_arrays import positions
 from ..blender.object_references import settings_of
 from ..blender.splat_layouts import holds_splats
@@ -59,7 +59,7 @@ def apply(context, source, pose, strength):
     if has_free_normals:
         turns = strength * rotations.turns(pose.field.jacobian(rest), pose.local_to_solve)
     carrying = Carrying(context, source)
-    space = Space(pose.local_to_solve, array(source.matrix_world) @ np.linalg.inv(pose.local_to_solve))
+    space = Space(pose.local_to_solve, array(world_matrix(source)) @ np.linalg.inv(pose.local_to_solve))
     carried = carrying.poses(space, depsgraph_of(context))
     shapes = carrying.moved(native.library(), pose.samples, pose.field, carried, strength)
     motion.bind(context, source)

@@ -81,7 +81,7 @@ def read(context, item, rig, groups):
 def to_armature(item, rig):
     """(4, 4) from an object's coordinates into the armature's; UserError where a scale flattens one."""
     for one in (item, rig):
-        space_of(one.matrix_world, one.name)
+        space_of(matrix_of(one), one.name)
     return inverse(matrix_of(rig)) @ matrix_of(item)
 
 

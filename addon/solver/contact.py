@@ -9,7 +9,7 @@ import numpy as np
 
 from ..blender import mesh_arrays
 from ..blender.actions import has_keys
-from ..blender.evaluation import depsgraph_of
+from ..blender.evaluation import depsgraph_of, world_matrix
 from ..blender.object_references import in_scene, settings_of
 from ..blender.property_definitions import from_single_precision
 from ..core.errors import UserError
@@ -185,7 +185,7 @@ def for_job(context, source):
     reason = refusal(source)
     if reason is not None:
         raise reason
-    space = space_of(source.matrix_world, source.name)
+    space = space_of(world_matrix(source), source.name)
     return contact_of(source, settings_of(source), space, depsgraph_of(context))
 
 

@@ -2,6 +2,7 @@
 import bpy
 
 from ..blender import vertex_groups
+from ..blender.evaluation import world_matrix
 from ..blender.host import has_window
 from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
@@ -48,7 +49,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         values = effective_values(STYLIZE, settings, self)
         af = native.library()
         options = options_of("stylize", values)
-        space = space_of(source.matrix_world, source.name)
+        space = space_of(world_matrix(source), source.name)
         style = style_settings.requested_style(settings, space, self)
         handles = empties.solve_handles(source, space, of_groups) if settings.use_handles else []
         weights = style_settings.region_weights(context, source, settings, of_groups, self.in_place(source))

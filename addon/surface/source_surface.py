@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
+from ..blender.evaluation import world_matrix
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.splat_layouts import Splats
 from ..blender.vertex_groups import NearestVertices
@@ -145,7 +146,7 @@ def read_surface(context, source, in_place=False, *, exact=None, fit_operator=No
     """
     context.view_layer.update()
     mesh, settings = mesh_arrays.read(context, source, in_place), settings_of(source)
-    space = space_of(source.matrix_world, source.name)
+    space = space_of(world_matrix(source), source.name)
     vertices, below = space.to_solve(mesh.vertices), modifier_stack.before(source, in_place)
     return SourceSurface(
         reference=ObjectReference(source),

@@ -5,6 +5,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ..blender.evaluation import world_matrix
 from ..blender.host import has_window
 from ..blender.language import about, translated
 from ..blender.native_options import options_of
@@ -69,7 +70,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         values = effective_values(WRAP, settings.wrap, self)
         af = native.library()
         options = options_of("wrap", values)
-        space = space_of(source.matrix_world, source.name)
+        space = space_of(world_matrix(source), source.name)
         other = landmarks.target_of(source, self.onto)
         self.end_live(context, source, "WRAP")
         fitting, below = None, ()
