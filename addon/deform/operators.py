@@ -10,7 +10,7 @@ from ..blender.property_definitions import annotations, effective_values
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
-from ..core.settings.parameters import DEFORM
+from ..core.settings.parameters import DEFORM, is_fast
 from ..handles import empties, scaling
 from ..handles.native_handles import native_handles
 from ..properties.choices import result_properties
@@ -45,8 +45,10 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         options = options_of("deform", values)
         handles = empties.solve_handles(source, space_of(world_matrix(source), source.name), weights)
 
-        contact = for_job(context, source)
-        require_reach_supported(handles, values)
+        fast = is_fast(values, DEFORM)
+        contact = for_job(context, source, fast)
+        if not fast:
+            require_no_reach(handles)
         scaled = scaling.ignored(source)
         if scaled is not None:
             self.warnings.append(about(source.name, scaled))
@@ -61,10 +63,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         return plan_solve_job(context, self, source, "DEFORM", values["samples"], values["seed"], solve)
 
 
-def require_reach_supported(handles, values):
-    """UserError where a handle has a reach that these settings do not support."""
-    if values["field"].lower() not in ("neural", "invertible") and not values["exact_handles"]:
-        return
+def require_no_reach(handles):
     for handle in handles:
         if handle.reach > 0:
             raise UserError("{name} has a reach; take the method Fast, without Exact Handles", handle)

@@ -180,9 +180,11 @@ def contact_of(source, settings, space, depsgraph):
     return ContactTerm(key, solids, height, up, group.itself)
 
 
-def for_job(context, source):
-    """The same for a solve of its own; UserError where nothing is in the way."""
+def for_job(context, source, fast):
+    """The same for a solve of its own, by the `fast` method; UserError where nothing is in the way."""
     reason = refusal(source)
+    if reason is None and settings_of(source).contact.use and not fast:
+        reason = UserError("{name}: Contact needs the method Fast, without Exact Handles", source)
     if reason is not None:
         raise reason
     space = space_of(world_matrix(source), source.name)

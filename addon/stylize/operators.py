@@ -11,6 +11,7 @@ from ..blender.property_definitions import annotations, effective_values
 from ..blender.source_operator import SourceOperator
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
+from ..core.settings.parameters import is_fast
 from ..core.settings.styles import STYLIZE
 from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles import empties
@@ -54,7 +55,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         handles = empties.solve_handles(source, space, of_groups) if settings.use_handles else []
         weights = style_settings.region_weights(context, source, settings, of_groups, self.in_place(source))
 
-        contact = for_job(context, source)
+        contact = for_job(context, source, is_fast(values, STYLIZE))
 
         def solve(tracker, rest, samples, weight):
             blend = (

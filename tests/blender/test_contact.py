@@ -81,7 +81,7 @@ def test_what_cannot_be_an_obstacle_is_said():
     group.use = True
     assert "neither" in str(contact.refusal(bar))
     group.itself = True
-    assert contact.refusal(bar) is None and contact.for_job(bpy.context, bar).made().itself
+    assert contact.refusal(bar) is None and contact.for_job(bpy.context, bar, fast=True).made().itself
     group.itself = False
     bpy.ops.arapfields.add_obstacle()  # nothing else is selected
     entry = group.obstacle_list[0]
@@ -117,8 +117,19 @@ def test_what_cannot_be_an_obstacle_is_said():
     assert not bpy.ops.arapfields.remove_obstacle.poll()
 
 
+def test_a_method_that_heeds_no_contact_is_refused_by_name():
+    bar, _, _ = pressed()
+    bar.arapfields.contact.use = bar.arapfields.contact.itself = True
+    refused = pytest.raises(RuntimeError, match=f"{bar.name}: Contact needs the method Fast")
+    for options in ({"field": "neural"}, {"field": "invertible"}, {"exact_handles": True}):
+        with refused:
+            bpy.ops.arapfields.deform(**options)
+    with refused:
+        bpy.ops.arapfields.stylize(field="neural")
+
+
 def solids(bar):
-    return contact.for_job(bpy.context, bar).solids
+    return contact.for_job(bpy.context, bar, fast=True).solids
 
 
 def test_obstacles_are_read_as_they_are_shown():
@@ -144,7 +155,7 @@ def test_obstacles_are_read_as_they_are_shown():
         assert np.allclose(seen, scenes.world_points(block), atol=1e-4)
         a, b, c = (solid.vertices[solid.triangles[:, k]] for k in range(3))
         assert np.einsum("ij,ij->", a, np.cross(b, c)) > 0  # the triangles face outwards
-        contact.for_job(bpy.context, bar).made(known)
+        contact.for_job(bpy.context, bar, fast=True).made(known)
         keys.add(solid.key)
         functions += known.values()
     assert functions[0] is functions[1] and len(keys) == 2

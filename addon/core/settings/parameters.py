@@ -5,6 +5,7 @@ import importlib.util
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 LARGEST = 2**31 - 1  # that Blender's integers hold
 
@@ -101,6 +102,11 @@ def method_of(group, parameters):
         return field
     of_networks = [p for p in parameters if "neural" in p.methods]
     return "neural" if any(getattr(group, p.name) != p.default for p in of_networks) else "radial"
+
+
+def is_fast(values, parameters):
+    """Whether an operation with these values solves by radial functions, with handles that pull."""
+    return method_of(SimpleNamespace(**values), parameters) == "radial" and not values.get("exact_handles")
 
 
 def counts(parameter, group, method):
