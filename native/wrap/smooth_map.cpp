@@ -23,7 +23,7 @@ namespace {
 /// Points on the surface, of which so many are chosen far from each other.
 constexpr Index candidates = 4000, chosen = 1000;
 /// How little a point weighs.
-constexpr double smoothing = 2e-3;
+constexpr double point_smoothing = 2e-3;
 /// Points beside the surface, where space grows across as the area's square root: they tell what a plane does
 /// not. How far they lie, and how little they weigh.
 constexpr Index beside = 250;
@@ -105,7 +105,7 @@ SmoothMap surface_map(const TriangleMesh& from, PointsIn to, const Progress& pro
   const std::vector<Index> rows = farthest_points(before, chosen).indices;
   const auto count = static_cast<Index>(rows.size()), sides = std::min(beside, count), all = count + sides;
   Points values(all, 3), centers(all, 3);
-  Vector least = Vector::Constant(all, smoothing);
+  Vector least = Vector::Constant(all, point_smoothing);
   centers.topRows(count) = rows_of(before, rows);
   values.topRows(count) = rows_of(after, rows);
   const double size = diagonal_of(before);

@@ -78,6 +78,6 @@ def test_an_unsaved_file_asks_for_a_place():
     animated()
     with pytest.raises(RuntimeError, match=r"Save the \.blend first"):
         bpy.ops.arapfields.bake(start=1, end=2)
-    path = tempfile.mkdtemp() + "/anywhere.pc2"
+    path = os.path.join(tempfile.mkdtemp(), "anywhere.pc2")
     assert bpy.ops.arapfields.bake(start=1, end=2, filepath=path) == {"FINISHED"}
     assert bpy.data.objects["Bar"].modifiers[0].filepath == path
