@@ -10,7 +10,7 @@ import bpy
 
 from ..core.errors import UserError
 from ..names import FIELD_GROUP, LAYER_GROUP
-from .evaluation import updated
+from .evaluation import is_disabled, updated
 from .object_references import settings_of
 from .removal import remove_modifier
 from .splat_layouts import holds_splats
@@ -149,7 +149,8 @@ def is_stage(scene):
 @contextmanager
 def evaluated(context, source, kept):
     """(object, depsgraph) of the object with these of its modifiers alone, for as long as the block runs."""
-    if all(modifier in kept for modifier in source.modifiers if modifier.show_viewport):
+    is_whole = all(modifier in kept for modifier in source.modifiers if modifier.show_viewport)
+    if is_whole and not is_disabled(source):
         depsgraph = updated(context.view_layer)
         yield source.evaluated_get(depsgraph), depsgraph
         return

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """bake: the animation of a .blend as it is, into caches or another program's file, alone or in parts."""
 
+import contextlib
 import sys
 
 import bpy
@@ -25,8 +26,8 @@ def run_bake(options, _):
     for place in (target, folder / "cache" if folder and folder.parent.is_dir() else None):
         if place:
             files.check_place(place)
-    choose(objects_to_solve(options) if options.objects else animated(options))
-    with progress(options.quiet):
+    sources = objects_to_solve(options) if options.objects else animated(options)
+    with progress(options.quiet), chosen(sources):
         if suffix in EXPORTS:
             reason = failure(
                 bpy.ops.arapfields.export_animation,
@@ -80,11 +81,27 @@ def animated(options):
     return meshes
 
 
-def choose(sources):
-    """Selects these objects, all of which the operators then work on."""
+@contextlib.contextmanager
+def chosen(sources):
+    """Has operators work on these objects, also on those that are disabled in viewports: they are shown and
+    selected for as long as the block runs."""
+    home, disabled, brought = bpy.context.scene.collection, [], []
     for item in bpy.context.selected_objects:
         item.select_set(False)
     for item in sources:
         item.hide_set(False)
+        if item.hide_viewport:
+            disabled.append(item)
+            item.hide_viewport = False
+        if not item.visible_get():
+            brought.append(item)
+            home.objects.link(item)
         item.select_set(True)
     bpy.context.view_layer.objects.active = sources[0]
+    try:
+        yield
+    finally:
+        for item in disabled:
+            item.hide_viewport = True
+        for item in brought:
+            home.objects.unlink(item)

@@ -10,7 +10,7 @@ from ..core.runtime import jobs
 from ..core.settings.parameters import SKIN
 from ..skin import rig as rigs
 from . import files
-from .bake import choose
+from .bake import chosen
 from .single import failure, objects_to_solve, progress
 
 
@@ -25,10 +25,9 @@ def run_skin(options, _):
     meshes = objects_to_solve(options)
     if not options.objects:
         meshes = [item for item in meshes if rigs.refusal_of(armature, item) is None]
-    choose([armature, *meshes])
     given = {p.name: getattr(options, p.name) for p in SKIN if getattr(options, p.name) is not None}
     given |= {"groups": options.groups.upper()} if options.groups else {}
-    with progress(options.quiet):
+    with progress(options.quiet), chosen([armature, *meshes]):
         reason = failure(bpy.ops.arapfields.skin, **given)
     for level, text in jobs.messages():
         print(f"arapfields: {text}", file=sys.stdout if level == "INFO" else sys.stderr, flush=True)
@@ -44,6 +43,8 @@ def rig_named(options):
     found = [item for item in bpy.context.view_layer.objects if item.type == "ARMATURE"]
     names = [item.name for item in found]
     wanted = [item for item in found if options.armature in (None, item.name)]
+    if not found:
+        raise UserError(f"{options.input}: holds no armature")
     if len(wanted) != 1:
-        raise UserError(f"{options.input}: --armature names one of: {', '.join(sorted(names)) or 'none'}")
+        raise UserError(f"{options.input}: --armature names one of: {', '.join(sorted(names))}")
     return wanted[0]

@@ -32,6 +32,53 @@ def scene(blender, tmp_path):
     return folder
 
 
+def save_scenes_with_it_disabled(folder):
+    """In the worker: the same with shape keys, elsewhere; shown, or disabled by itself or its collection."""
+    bar, _ = baking.saved_animation("Bar", Path(folder))
+    bar.location.y += 3.0
+    root = bpy.data.objects.new("Root", None)  # what takes the handles along
+    bpy.context.scene.collection.objects.link(root)
+    root.location.y = 3.0
+    for handle in bar.arapfields.handles:
+        handle.empty.parent = root
+    bar.shape_key_add(name="Basis")
+    key = bar.shape_key_add(name="Wide")
+    for point in key.data:
+        point.co.y *= 1.5
+    key.value = 1.0
+    home = bpy.data.collections.new("Home")
+    bpy.context.scene.collection.children.link(home)
+    home.objects.link(bar)
+    bpy.context.scene.collection.objects.unlink(bar)
+    bpy.context.scene.frame_end = 5
+    bpy.ops.wm.save_as_mainfile(filepath=str(Path(folder) / "shown.blend"))
+    for name, item in (("itself", bar), ("collection", home)):
+        item.hide_viewport = True
+        bpy.ops.wm.save_as_mainfile(filepath=str(Path(folder) / f"{name}.blend"))
+        item.hide_viewport = False
+
+
+def is_disabled_as_it_was(folder, name):
+    """In the worker: the output has the object where it was."""
+    bpy.ops.wm.open_mainfile(filepath=str(Path(folder) / f"{name}_baked.blend"))
+    bar = bpy.data.objects["Bar"]
+    assert [home.name for home in bar.users_collection] == ["Home"] and bar.modifiers
+    assert bar.hide_viewport == (name == "itself")
+    assert bpy.data.collections["Home"].hide_viewport == (name == "collection")
+
+
+def test_an_object_that_is_disabled_in_viewports_is_baked_as_one_that_is_shown(blender, command, tmp_path):
+    blender.call(__file__, "save_scenes_with_it_disabled", {"folder": tmp_path})
+    caches = {}
+    for name in ("shown", "itself", "collection"):
+        for objects in ((), ("--objects", "Bar")):
+            command("bake", "-i", tmp_path / f"{name}.blend", "--folder", tmp_path / name, *objects)
+            caches[name, objects] = (tmp_path / name / "Bar.pc2").read_bytes()
+        command("bake", "-i", tmp_path / f"{name}.blend", "-o", tmp_path / f"{name}_baked.blend")
+        blender.call(__file__, "is_disabled_as_it_was", {"folder": tmp_path, "name": name})
+    assert len(set(caches.values())) == 1, {key: hash(value) for key, value in caches.items()}
+
+
 @pytest.mark.slow
 def test_parts_in_any_order_make_the_cache_that_one_process_makes(scene, user_folder):
     folder = scene
