@@ -9,6 +9,7 @@ objects and bones keyframes.
 import contextlib
 
 from ..blender import modifier_stack
+from ..blender.actions import key_at
 from ..blender.language import translated
 from ..carried import played_points
 from ..carried.carried_objects import carrier_class, find
@@ -161,7 +162,7 @@ class CarriedBake:
             put_key(key, basis + (shape - carried.carrier.points))
             for frame in frames[max(0, number - 1) : number + 2]:
                 key.value = float(frame == frames[number])
-                key.keyframe_insert("value", frame=frame)
+                key_at(key, "value", frame)
 
     def add_keyframes(self, context, carried, item, entry):
         turns = {}
@@ -208,4 +209,4 @@ def insert(item, carrier, frame, turns):
             turns[owner.name, turned] = turn
             setattr(owner, turned, turn)
         for path in (turned, *others):
-            owner.keyframe_insert(path, frame=frame, group=group)
+            key_at(owner, path, frame, group=group)

@@ -4,10 +4,14 @@
 import contextlib
 import queue
 from dataclasses import dataclass
+from math import ceil, floor
 
+from ..blender.actions import pace
 from ..core.errors import UserError
 from ..core.runtime.progress import JobCancelled
 from ..solver import frame_range
+
+NOISE = 1e-3  # of a keyframe's place, in frames
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,7 @@ def choose(context, sources, values):
     scene, which = context.scene, values["range"]
     first, last = values.get("start"), values.get("end")
     if first is None or last is None:
-        span = animation(sources) if which == "HANDLES" else frame_range.scene_range(scene)
+        span = animation(scene, sources) if which == "HANDLES" else frame_range.scene_range(scene)
         first, last = span[0] if first is None else first, span[1] if last is None else last
     if last < first:
         raise UserError("The last frame, {last}, comes before the first, {first}", first=first, last=last)
@@ -47,12 +51,14 @@ def choose(context, sources, values):
     return Frames(float(first), step, int((last - first) / step + 1e-9) + 1)
 
 
-def animation(sources):
+def animation(scene, sources):
+    """(first, last) frame of the scene that the keyframes of all that moves the sources span."""
     spans = [span for span in (frame_range.animation_range(*one) for one in sources) if span is not None]
     if not spans:
         names = ", ".join(source.name for source, _ in sources)
         raise UserError("Nothing that moves {names} is animated; choose another range", names=names)
-    return round(min(first for first, _ in spans)), round(max(last for _, last in spans))
+    ends = [end / pace(scene) for end in (min(first for first, _ in spans), max(last for _, last in spans))]
+    return floor(ends[0] + NOISE), ceil(ends[1] - NOISE)
 
 
 @contextlib.contextmanager

@@ -43,3 +43,13 @@ def curves_of(action):
     """An action's curves."""
     for bag in bags_of(action):
         yield from bag.fcurves
+
+
+def pace(scene):
+    """How far its animation goes on from one frame of a scene to the next; 1 unless frames are remapped."""
+    return scene.render.frame_map_old / scene.render.frame_map_new
+
+
+def key_at(owner, path, frame, **given):
+    """Inserts a keyframe of what is to be seen at a frame of the scene."""
+    owner.keyframe_insert(path, frame=frame * pace(bpy.context.scene), **given)

@@ -4,7 +4,10 @@
 While it plays, the field's modifier is off; what gives the object a new motion puts it back.
 """
 
+import bpy
+
 from ..blender import modifier_stack
+from ..blender.actions import pace
 from ..blender.object_references import settings_of
 from ..names import CACHE_MODIFIER
 from . import inputs, masks
@@ -22,7 +25,7 @@ def play(source, path, start, step):
     modifier.cache_format = "MDD" if path.lower().endswith(".mdd") else "PC2"
     modifier.filepath = path
     modifier.time_mode, modifier.play_mode = "FRAME", "SCENE"  # counted in samples
-    modifier.frame_scale, modifier.frame_start = 1.0 / step, start / step
+    modifier.frame_scale, modifier.frame_start = 1.0 / (step * pace(bpy.context.scene)), start / step
     set_playing(source, True)
     return modifier
 

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
+from ..blender.actions import key_at
 from ..blender.object_references import settings_of
 from ..blender.removal import remove_mesh_object
 from ..core.errors import UserError
@@ -147,7 +148,7 @@ def add_frame(item, frames, number, shape):
     mesh_arrays.put_vectors(key.data, shape, "co")
     for frame in frames[max(0, number - 1) : number + 2]:
         key.value = float(frame == frames[number])
-        key.keyframe_insert("value", frame=frame)
+        key_at(key, "value", frame)
 
 
 def keeps_vertices(source, in_place=False):

@@ -11,7 +11,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.baking import animated, at, cancelled_at, stepped
+    from support.blender.baking import EXACT, animated, at, cancelled_at, solved, stepped
     from support.blender.riders import rider
 
     from addon.animation import caches
@@ -123,3 +123,25 @@ def test_many_keys_say_what_they_weigh():
     assert warnings == [
         "Bar: Shape keys of 13.9 kB in the .blend and in memory; a cache would take neither"
     ], warnings
+
+
+@pytest.mark.parametrize("new", [200, 50])
+@pytest.mark.parametrize("format", ["PC2", "MDD", "KEYS"])
+def test_a_bake_plays_at_the_scenes_frames_also_where_these_are_remapped(format, new, tmp_path):
+    """Keys from frame 1 to 5 take twice as long, frames 2 to 10, or half as long, 0.5 to 2.5."""
+    bar, render, path = animated(), bpy.context.scene.render, ""
+    render.frame_map_old, render.frame_map_new = 100, new
+    expected = {frame: solved(bar, frame) for frame in (2, 3)}
+    cord = rider("CURVE")
+    scenes.activate(cord, bar)
+    bpy.ops.arapfields.carry()
+    if format != "KEYS":
+        path = str(tmp_path / f"bar.{format.lower()}")
+    bar.arapfields.bake.range = "HANDLES"
+    assert bpy.ops.arapfields.bake(format=format, filepath=path) == {"FINISHED"}
+    played = bar if path else bpy.data.objects["Bar_baked"]
+    for frame, points in expected.items():
+        assert np.abs(at(played, frame) - points).max() < EXACT
+        values = {key.name.split()[-1]: key.value for key in cord.data.shape_keys.key_blocks[1:]}
+        assert values.pop(str(frame)) == 1.0 and not any(values.values())
+    assert len(values) == (8 if new == 200 else 3)
