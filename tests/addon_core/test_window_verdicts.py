@@ -3,6 +3,7 @@
 
 import ast
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -86,7 +87,7 @@ sys.exit(CODE if any(said.values()) else 0)
 def test_the_runner_says_of_each_part_how_it_ended(given, failed, tmp_path):
     blender = tmp_path / "blender.py"
     blender.write_text(f"{given}\n{BLENDER}")
-    environment = {**os.environ, "ARAPFIELDS_WINDOW": f"{sys.executable} {blender}"}
+    environment = {**os.environ, "ARAPFIELDS_WINDOW": shlex.join([sys.executable, str(blender)])}
     command = [sys.executable, "-m", "tests.gui", "--output", str(tmp_path), "use", "jobs", "tutorial"]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == bool(failed), done

@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from tests.windows import __main__ as windows  # noqa: E402
+from tests.windows.not_run import NOT_RUN  # noqa: E402
 
 TOOLS = ("x86_64-w64-mingw32-g++-posix", "make")
 WINE = shutil.which("wine64") or shutil.which("/usr/lib/wine/wine64")
@@ -38,6 +39,14 @@ def test_a_folder_without_enough_that_passed_is_no_success():
     assert windows.table({"a": {"b": ("passed", "")}})
     for found in ({}, {"b": ("passed", ""), "c": ("skipped", "")}, {"b": ("begun", "")}):
         assert not windows.table({"a": found})
+
+
+def test_what_does_not_run_under_wine_is_there():
+    """A test that is renamed would run, and fail, under its new name."""
+    for name in NOT_RUN:
+        path, _, function = name.partition("::")
+        text = (ROOT / path).read_text(encoding="utf-8")
+        assert not function or f"def {function.partition('[')[0]}" in text, name
 
 
 def test_posix_stands_only_where_windows_has_a_twin():

@@ -46,7 +46,6 @@ BLENDER = {
 }
 CORE = {
     "test_batch.py::test_one_failure_or_crash_stops_no_other": "no process of Windows ends by a signal",
-    "test_window_verdicts.py::test_the_runner_ends_as_its_blenders_do": "the window's checks run on Linux",
 }
 NOT_RUN = {f"tests/python/{name}": why for name, why in PYTHON.items()}
 NOT_RUN |= {f"tests/blender/{name}": why for name, why in BLENDER.items()}
