@@ -8,8 +8,10 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.geometry import cases
+from support.programs.cli import wait_until_loaded
 
 import arapfields as af
 
@@ -41,6 +43,22 @@ def test_ctrl_c_in_a_script():
     finally:
         running.kill()
     assert printed.split() == ["interrupted", "3"] and running.returncode == 0
+
+
+@pytest.mark.parametrize("delay", np.linspace(0.05, 0.4, 6).round(2))
+def test_ctrl_c_while_the_library_is_imported_is_no_failed_import(delay):
+    """Of Python's end by Ctrl-C, or at its sleep; it was an ImportError in a quarter of tries."""
+    script = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    script += "import arapfields, time; time.sleep(60)"
+    running = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.PIPE, text=True)
+    try:
+        wait_until_loaded(running)
+        time.sleep(delay)
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert said.splitlines()[-1] == "KeyboardInterrupt" and running.returncode != 1, said
 
 
 def interrupted_after(seconds, call):

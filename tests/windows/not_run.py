@@ -22,7 +22,7 @@ PYTHON = {
     "test_outputs.py::test_verbs_on_a_full_disk": LIMITS,
     "test_point_cache.py::test_memory_does_not_grow_with_the_frames": LIMITS,
     "test_point_cache_damage.py::test_a_disk_that_fills_meanwhile_is_named": LIMITS,
-    "test_interrupt.py::test_ctrl_c_in_a_script": CTRL_C,
+    "test_interrupt.py::test_ctrl_c": CTRL_C,
     "test_cli_errors.py::test_interrupt_cancels_and_leaves_nothing": CTRL_C,
     "test_outputs.py::test_only_regular_files_are_written[pipe]": KINDS,
     "test_outputs.py::test_only_regular_files_are_written[device]": KINDS,

@@ -4,7 +4,7 @@
 Arrays are NumPy, all coordinates are the mesh's own; distances are negative inside.
 """
 
-from . import _libtorch as _libtorch  # first, since it compares torch's version before anything is loaded
+from . import _loading as _loading  # first, since the rest needs the native module
 from ._copying import register as _register_copies
 from ._native import (
     Attachment,

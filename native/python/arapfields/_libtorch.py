@@ -2,7 +2,7 @@
 """Whether the torch beside this package is the one that its library was built against.
 
 libtorch's C++ interface changes from version to version: with another one the library fails to load at best,
-and crashes at worst. So importing this module compares the versions, before anything is loaded.
+and crashes at worst. So the versions are compared before anything is loaded.
 """
 
 from importlib import metadata
@@ -26,6 +26,3 @@ def check(folder: Path = HERE) -> None:
     if installed.partition("+")[0] != built_against:
         found = f"arapfields was built against torch {built_against}, and torch {installed} is installed"
         raise ImportError(f"{found}: {remedy}, or build arapfields anew")
-
-
-check()

@@ -50,23 +50,34 @@ def process(*arguments):
     return command, {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, places))}
 
 
+def wait_until(process, is_done):
+    while process.poll() is None and not is_done():
+        time.sleep(0.01)
+
+
+def wait_until_loaded(running):
+    """Sleeps until a process has begun to load the library."""
+    maps = Path(f"/proc/{running.pid}/maps")  # Linux alone has it
+    if maps.exists():
+        wait_until(running, lambda: "_native" in maps.read_text())
+    else:
+        time.sleep(1.0)
+
+
 def wait_until_at_work(running):
     """Sleeps until a process has loaded the library and worked on for a while, on however busy a machine."""
-    process = Path(f"/proc/{running.pid}")  # Linux alone has it
-    if not process.exists():
-        return time.sleep(3.0)
+    wait_until_loaded(running)
+    stat = Path(f"/proc/{running.pid}/stat")
+    if not stat.exists():
+        time.sleep(2.0)
+        return
 
     def worked():
-        user, system = (process / "stat").read_text().rpartition(")")[2].split()[11:13]
+        user, system = stat.read_text().rpartition(")")[2].split()[11:13]
         return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
-    def waits(is_done):
-        while running.poll() is None and not is_done():
-            time.sleep(0.05)
-
-    waits(lambda: "_native" in (process / "maps").read_text())
     begun = worked()
-    waits(lambda: worked() > begun + 1.0)
+    wait_until(running, lambda: worked() > begun + 1.0)
 
 
 def write_octahedron(path, quads=False):

@@ -10,8 +10,8 @@ import numpy as np
 
 from .. import _native
 from .._files import existing_file, write_arrays
+from .._interrupts import uninterrupted
 from .._native import InvalidInput, ObjectStyle
-from .running import uninterrupted
 
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".off")
 CLOUD_SUFFIXES = (".ply", ".npz", ".xyz")

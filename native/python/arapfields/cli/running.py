@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Long calls with a progress bar, and outputs that appear whole or not at all."""
 
-import contextlib
 import os
-import signal
 import sys
 import threading
 from pathlib import Path
@@ -20,22 +18,6 @@ def place(path):
         return os.path.realpath(path)
     except OSError:
         return os.path.abspath(path)
-
-
-@contextlib.contextmanager
-def uninterrupted():
-    """Ctrl-C during the block takes effect at its end."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    waiting = []
-    before = signal.signal(signal.SIGINT, lambda *_: waiting.append(True))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if waiting:
-        signal.raise_signal(signal.SIGINT)
 
 
 def with_progress(label, call, quiet=False):

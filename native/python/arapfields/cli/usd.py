@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .._interrupts import uninterrupted
 from .._native import InvalidInput
-from .running import uninterrupted
 
 SUFFIXES = (".usd", ".usda", ".usdc")
 AXES = ("y", "z")
