@@ -40,7 +40,7 @@ curves and what changes its topology as well. They follow each further solve"""
         else:
             helper.write(carrier, rows)
         count = len(bpy.data.user_map(subset=[carrier])[carrier] - {source})
-        return translated("{count} objects move by the field of {name}", count=count, name=source.name)
+        return translated("Objects that move by the field of {name}: {count}", count=count, name=source.name)
 
 
 def require_free(source, item):

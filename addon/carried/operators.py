@@ -50,7 +50,7 @@ class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
         error = bones.unposed(context, source)
         for text in [*refused, *([] if error is None else [translated(error)])]:
             self.report({"WARNING"}, text)
-        return translated("{name} carries {count} more objects", name=source.name, count=added)
+        return translated("Objects that {name} now carries as well: {count}", name=source.name, count=added)
 
 
 def carry(source, item, way):

@@ -32,7 +32,7 @@ class ARAPFIELDS_OT_add_obstacle(ObstacleOperator, bpy.types.Operator):
             if item is None or (item.type == "MESH" and item not in known):
                 add(source, item)
         group.use = True
-        return translated("{name}: {count} obstacles", name=source.name, count=len(group.obstacle_list))
+        return translated("Obstacles of {name}: {count}", name=source.name, count=len(group.obstacle_list))
 
 
 class ARAPFIELDS_OT_remove_obstacle(ObstacleOperator, bpy.types.Operator):

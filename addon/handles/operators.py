@@ -91,7 +91,7 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
         for other in sorted(item.name for item in others):
             text = translated("Handles of {other} were taken over by {name}", other=other, name=source.name)
             self.report({"WARNING"}, text)
-        return translated("{count} handles added to {name}", count=len(selected), name=source.name)
+        return translated("Handles added to {name}: {count}", count=len(selected), name=source.name)
 
 
 class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
@@ -117,7 +117,7 @@ class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
             error = bones.unposed(context, source)
             if error is not None:
                 self.report({"WARNING"}, translated(error))
-        return translated("{count} handles added to {name}", count=len(names), name=source.name)
+        return translated("Handles added to {name}: {count}", count=len(names), name=source.name)
 
 
 class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
@@ -142,7 +142,7 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
             else:
                 empties.mirror(context, source, entry, "XYZ".index(self.axis))
         held_counts.count_inside(context, source)
-        return translated("{count} handles mirrored", count=len(entries))
+        return translated("Handles mirrored: {count}", count=len(entries))
 
 
 class RestOperator(HandleOperator):
@@ -166,7 +166,7 @@ class ARAPFIELDS_OT_set_rest(RestOperator, bpy.types.Operator):
         for entry in entries:
             empties.store_rest(source, entry)
         held_counts.count_inside(context, source)
-        return translated("{count} rest poses stored", count=len(entries))
+        return translated("Rest poses stored: {count}", count=len(entries))
 
 
 class ARAPFIELDS_OT_reset_handle(RestOperator, bpy.types.Operator):
@@ -180,7 +180,7 @@ class ARAPFIELDS_OT_reset_handle(RestOperator, bpy.types.Operator):
             if entry.kind != "BONE":
                 empties.reset(source, entry)
         bones.reset(context, source, [e for e in entries if e.kind == "BONE"])
-        return translated("{count} handles moved back", count=len(entries))
+        return translated("Handles moved back: {count}", count=len(entries))
 
 
 class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
@@ -200,7 +200,7 @@ class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
             empties.remove(source, index)
             if self.delete and is_own:
                 bpy.data.objects.remove(empty)
-        return translated("{count} handles removed", count=len(rows))
+        return translated("Handles removed: {count}", count=len(rows))
 
 
 CLASSES = [

@@ -168,7 +168,8 @@ def refusal_of_stack(source):
     if not names:
         return UserError("{name} shows one shape key alone, or absolute ones; choose Modifier", source)
     return UserError(
-        "{modifiers} of {name} change its vertices before; apply them, or choose Modifier for the result",
+        "{name} has modifiers that change its vertices before ({modifiers}); apply them, "
+        "or choose Modifier for the result",
         source,
         modifiers=", ".join(names),
     )

@@ -61,7 +61,7 @@ class ARAPFIELDS_OT_clear_cache(ReportingOperator, bpy.types.Operator):
         return busy()
 
     def change(self, context, source):
-        return translated("{count} fitted surfaces deleted", count=fit_cache().clear())
+        return translated("Fitted surfaces deleted: {count}", count=fit_cache().clear())
 
 
 CLASSES = [

@@ -174,7 +174,7 @@ class ARAPFIELDS_OT_mirror_landmarks(SourceOperator, bpy.types.Operator):
 
     def change(self, context, source):
         count = landmarks.mirror(context, source)
-        return translated("{count} pairs of landmarks added", count=count)
+        return translated("Pairs of landmarks added: {count}", count=count)
 
 
 class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):

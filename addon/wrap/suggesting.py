@@ -51,7 +51,7 @@ class ARAPFIELDS_OT_suggest_landmarks(JobOperator, bpy.types.Operator):
             made = [pair for pair in pairs if all(np.linalg.norm(pair[0] - one) > size for one in known)]
             for pair in made:
                 landmarks.add(bpy.context, item, onto, transform(surface.space.solve_to_world, pair))
-            return translated("{count} pairs of landmarks added", count=len(made))
+            return translated("Pairs of landmarks added: {count}", count=len(made))
 
         return Item(source.name, work, apply)
 

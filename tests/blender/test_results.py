@@ -86,7 +86,7 @@ def test_the_earlier_name_of_result_still_counts():
 
 REFUSED = {
     "a key on a surface": "A shape key keeps the mesh",
-    "a modifier": "Mirror of Bar change its vertices before; apply them, or choose Modifier",
+    "a modifier": r"Bar has modifiers that change its vertices before \(Mirror\); apply them",
 }
 
 
