@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Empty or the bone that moves a handle, and its place."""
 
+import bpy
 import numpy as np
 
 from ..blender.evaluation import is_disabled, is_moved, world_matrix
@@ -18,17 +19,25 @@ def matrix_of(item, bone=""):
 
 def is_frozen(item):
     """Whether an object moves, but is disabled, so that Blender does not move it."""
-    parent = item.parent
-    return is_disabled(item) and (is_moved(item) or (parent is not None and is_frozen(parent)))
+    bones, parent = item.pose.bones if item.pose is not None else (), item.parent
+    moves = is_moved(item) or any(bone.constraints for bone in bones)
+    return is_disabled(item) and (moves or (parent is not None and is_frozen(parent)))
+
+
+def is_needed(item, source):
+    """Whether Blender evaluates a disabled object nevertheless, as others than the source hang on it."""
+    users = bpy.data.user_map(subset=[item])[item]
+    others = [one for one in users if isinstance(one, bpy.types.Object) and one not in (source, item)]
+    return any(not is_disabled(one) for one in others)
 
 
 def frozen(entries):
-    """The UserError that names a handle whose Empty is so; None where all of them go on."""
+    """The UserError that names what moves a handle where that is so; None where all of them go on."""
     for entry in entries:
-        if entry.kind != "BONE" and is_frozen(entry.empty):
+        mover = mover_of(entry)
+        if is_frozen(mover) and not is_needed(mover, entry.id_data):
             return UserError(
-                "{name} is disabled in viewports, so that nothing moves it; hide it by its eye instead",
-                entry.empty,
+                "{name} is disabled in viewports, so that nothing moves it; hide it by its eye instead", mover
             )
     return None
 

@@ -9,6 +9,7 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.baking import animated
+    from support.blender.bones import rigged_bar
 
 pytestmark = pytest.mark.in_blender
 
@@ -63,6 +64,29 @@ def test_one_that_would_move_is_named_rather_than_baked_where_it_stands(way):
         with pytest.raises(RuntimeError, match="Moving is disabled in viewports, so that nothing moves it"):
             getattr(bpy.ops.arapfields, operator)(**given)
     assert not bar.modifiers and "Bar_baked" not in bpy.data.objects
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_an_armature_that_would_move_is_named_unless_others_are_posed_by_it(way):
+    bar, rig = rigged_bar()
+    bpy.ops.arapfields.add_bones()
+    bone = rig.pose.bones["Second"]
+    for frame, angle in ((1, 0.0), (3, 0.6)):
+        bone.rotation_euler.z = angle
+        bone.keyframe_insert("rotation_euler", frame=frame)
+    scenes.activate(bar)
+    globals()[way](rig)
+    with pytest.raises(RuntimeError, match="is disabled in viewports, so that nothing moves it"):
+        bpy.ops.arapfields.bake(start=1, end=3, format="KEYS")
+    shirt = scenes.bar("Shirt")
+    shirt.modifiers.new("Armature", "ARMATURE").object = rig
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.bake(start=1, end=3, format="KEYS") == {"FINISHED"}
+    baked, heights = bpy.data.objects["Bar_baked"], []
+    for frame in (1, 3):
+        bpy.context.scene.frame_set(frame)
+        heights.append(scenes.world_points(baked)[:, 1].max())
+    assert heights[1] - heights[0] > 0.2
 
 
 def test_one_that_is_hidden_by_its_eye_goes_on():
