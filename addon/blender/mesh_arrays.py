@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import UserError, refuse
+from ..core.geometry.fitting import vertex_areas
 from . import modifier_stack, splat_layouts
 from .point_data import face_count, points_of
 
@@ -110,6 +111,12 @@ def nothing_in(name, vertices, faces):
     if not vertices:
         return UserError("{name}: the mesh is empty", name=name)
     return None if faces else UserError("{name}: the mesh has no faces", name=name)
+
+
+def flat(name, vertices, triangles):
+    """The UserError for triangles of which none has an area."""
+    has_area = vertex_areas(vertices, triangles).any()
+    return None if has_area else UserError("{name}: its faces have no area", name=name)
 
 
 def read(context, source, in_place=False):

@@ -60,6 +60,7 @@ def read(context, item, rig, groups):
     before = [m for m in list(item.modifiers)[: place(item, rig)] if m.show_viewport]
     with modifier_stack.mesh_of(context, item, before) as mesh:
         arrays = mesh_arrays.arrays_of(item, mesh)
+        refuse(mesh_arrays.flat(item.name, arrays.vertices, arrays.triangles))
         painted_groups = {name: item.vertex_groups[name].index for name in painted.names(item)}
         stiffness = painted.of_weights(item, vertex_groups.weights_in(mesh, painted_groups))
     own = mesh_arrays.positions(item.data)

@@ -10,7 +10,6 @@ from mathutils import Matrix
 from ..blender import mesh_arrays
 from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..core.errors import UserError, refuse
-from ..core.geometry.fitting import vertex_areas
 from ..core.geometry.spaces import inverse, transform
 from ..handles.empties import make_empty, matrix_of
 from ..handles.palette import free_colour
@@ -38,8 +37,7 @@ def read_target(context, target, space):
     to_solve = space.world_to_solve @ matrix_of(target)
     mirrored = np.linalg.det(to_solve[:3, :3]) < 0
     vertices, triangles = transform(to_solve, mesh.vertices), mesh.triangles
-    if not vertex_areas(vertices, triangles).any():
-        raise UserError("{name}: its faces have no area", target)
+    refuse(mesh_arrays.flat(target.name, vertices, triangles))
     return vertices, triangles[:, ::-1] if mirrored else triangles
 
 

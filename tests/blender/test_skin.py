@@ -166,6 +166,11 @@ def no_faces(body, rig):
     body.data.vertices.add(3)
 
 
+def no_area(body, rig):
+    for vertex in body.data.vertices:
+        vertex.co = (vertex.co.x, 0.0, 0.0)
+
+
 def on_a_bone(body, rig):
     body.parent, body.parent_type, body.parent_bone = rig, "BONE", "Spine"
 
@@ -186,6 +191,7 @@ REFUSALS = {
     "No bone of Rig deforms": no_deforming,
     "Rig has no bones": no_bones,
     "Body: the mesh has no faces": no_faces,
+    "Body: its faces have no area": no_area,
     "Body moves with a bone already": on_a_bone,
     "Rig is in Edit Mode": in_edit_mode,
     "bones of Rig are handles of Body": bones_are_handles,
