@@ -84,8 +84,10 @@ Vector LocalThickness::at(PointsIn points) const {
   parallel_for(0, points.rows(), 64, [&](Index first, Index last) {
     Vector squares(n);
     for (Index i = first; i < last; ++i) {
-      squares.array() = (nodes.col(0) - points(i, 0)).square() + (nodes.col(1) - points(i, 1)).square() +
-                        (nodes.col(2) - points(i, 2)).square();
+      // Of a part, which cannot be resized: GCC 12 for ARM takes that for a use of freed memory.
+      squares.head(n).array() = (nodes.col(0) - points(i, 0)).square() +
+                                (nodes.col(1) - points(i, 1)).square() +
+                                (nodes.col(2) - points(i, 2)).square();
       const double nearest = squares.minCoeff(), farthest = nearest + width * width;
       double sum = 0.0, total = 0.0;
       for (Index j = 0; j < n; ++j)
