@@ -119,9 +119,10 @@ def flat(name, vertices, triangles):
     return None if has_area else UserError("{name}: its faces have no area", name=name)
 
 
-def read(context, source, in_place=False):
-    """What there is to work on of an object; UserError that names it when there is nothing."""
-    with modifier_stack.evaluated_mesh(context, source, in_place) as mesh:
+def read(context, source, in_place=False, frame=None):
+    """What there is to work on of an object, at the frame at hand or another; UserError that names it when
+    there is nothing."""
+    with modifier_stack.evaluated_mesh(context, source, in_place, frame) as mesh:
         return arrays_of(source, mesh)
 
 

@@ -147,20 +147,21 @@ def is_stage(scene):
 
 
 @contextmanager
-def evaluated(context, source, kept):
-    """(object, depsgraph) of the object with these of its modifiers alone, for as long as the block runs."""
+def evaluated(context, source, kept, frame=None):
+    """(object, depsgraph) of the object with these of its modifiers alone, for as long as the block runs;
+    at a frame other than that at hand where one is given."""
     is_whole = all(modifier in kept for modifier in source.modifiers if modifier.show_viewport)
-    if is_whole and not is_disabled(source):
+    if is_whole and not is_disabled(source) and frame is None:
         depsgraph = updated(context.view_layer)
         yield source.evaluated_get(depsgraph), depsgraph
         return
-    with staged(context, source, kept) as (copied, layer):
+    with staged(context, source, kept, frame) as (copied, layer):
         depsgraph = updated(layer)
         yield copied.evaluated_get(depsgraph), depsgraph
 
 
 @contextmanager
-def staged(context, source, kept):
+def staged(context, source, kept, frame=None):
     """(copy, view layer) of the object with these of its modifiers alone, in a scene of its own."""
     stage = bpy.data.scenes.new("ARAP Fields")
     copied = None
@@ -173,6 +174,9 @@ def staged(context, source, kept):
         updated(layer)  # the frame is set before there is anything to animate
         copied = cut_copy(source, {modifier.name for modifier in kept})
         stage.collection.objects.link(copied)
+        if frame is not None:
+            updated(layer)
+            stage.frame_current, stage.frame_subframe = frame, 0.0
         yield copied, layer
     finally:
         if copied is not None:
@@ -191,9 +195,9 @@ def cut_copy(source, kept):
 
 
 @contextmanager
-def evaluated_mesh(context, source, in_place=False):
+def evaluated_mesh(context, source, in_place=False, frame=None):
     """The mesh that is worked on, for as long as the block runs."""
-    with mesh_of(context, source, before(source, in_place)) as mesh:
+    with mesh_of(context, source, before(source, in_place), frame) as mesh:
         yield mesh
 
 
@@ -205,9 +209,9 @@ def moved_mesh(context, source):
 
 
 @contextmanager
-def mesh_of(context, source, kept):
+def mesh_of(context, source, kept, frame=None):
     """The mesh or point cloud as these of its modifiers make it, for as long as the block runs."""
-    with evaluated(context, source, kept) as (item, depsgraph):
+    with evaluated(context, source, kept, frame) as (item, depsgraph):
         if source.type == "POINTCLOUD":
             yield item.data
             return

@@ -28,6 +28,7 @@ def store_rest(source, entry):
     """Makes where the handle's Empty or bone is now its rest pose."""
     relative = inverse(matrix_of(source)) @ box_now(entry)
     entry.rest, entry.unwrapped = relative.ravel(), np.zeros(16)
+    entry.frame = bpy.context.scene.frame_current
 
 
 def used(source):

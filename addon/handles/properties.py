@@ -6,6 +6,8 @@ import bpy
 from ..blender.property_definitions import choice, colour, flag, integer, listeners, number, pointer, text
 from ..core.settings.choices import HANDLE_KINDS
 
+UNKNOWN_FRAME = -1048575  # before the first that Blender has
+
 
 def is_armature(_, item):
     return item.type == "ARMATURE"
@@ -64,6 +66,11 @@ class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
         size=16,
         name="Rest Box",
         description="The cube [-1, 1]³ → the object's coordinates, at rest (row by row)",
+    )
+    frame: integer(
+        "Rest Frame",
+        "The scene's frame when the rest pose was stored; -1048575 where it is not known",
+        default=UNKNOWN_FRAME,
     )
     unwrapped: bpy.props.FloatVectorProperty(
         size=16,

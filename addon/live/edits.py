@@ -15,7 +15,7 @@ from ..field_nodes import helper
 from ..handles import empties, movers
 from ..handles.empties import matrix_of
 from ..solver import secondary_motion
-from ..solver.source_reader import SourceChanged, uses_handles
+from ..solver.source_reader import SourceChanged, rest_frame, uses_handles
 from ..stiffness import painted
 
 SAME_STRETCH = 1e-6  # noise of a rotation in single precision
@@ -124,6 +124,7 @@ def layout_of(source, kind, scene):
         further += (style.region, style.region_material, style.use_handles)
     further += tuple((e.item.session_uid if e.item else 0, e.way) for e in settings.carried)
     further += (secondary_motion.layout_of(source, scene), helper.of(source) is not None)
+    further += (rest_frame(source, kind, settings.in_place),)
     used = uses_handles(settings, kind)
     return (held if used else [], used and empties.kept_rest(source), further, stack_of(source))
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack, user_preferences, vertex_groups
+from ..blender import mesh_arrays, modifier_stack, unkeyed, user_preferences, vertex_groups
 from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.point_data import shape_keys_of
@@ -15,9 +15,11 @@ from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..handles import empties, movers
+from ..handles.properties import UNKNOWN_FRAME
 from ..surface.source_surface import read_surface
 from . import secondary_motion, style_settings
 from .contact import contact_of
+from .frame_range import involved
 from .request import Request, StyleTerm
 from .setup import SolverSetup, energy_weights
 
@@ -41,11 +43,16 @@ class SourceReader:
         context.view_layer.update()
         self.reference, self.kind = ObjectReference(source), kind
         self.carrying = Carrying(context, source)
-        self.surface = read_surface(context, source, in_place, carrying=self.carrying)
+        frame = rest_frame(source, kind, in_place)
+        frame = None if frame == context.scene.frame_current else frame
+        with unkeyed.kept(context, [] if frame is None else involved(source, kind)):
+            self.surface = read_surface(context, source, in_place, carrying=self.carrying, frame=frame)
         self.moves_by_itself = in_place and has_motion_before(source, in_place)
         self.fingerprint = mesh_arrays.fingerprint(source.data)
         self.points = self.surface.local  # where the modifiers before have them now
         self.handles, self.setup = [], None
+        if frame is not None:
+            self.read_points(context, source)
 
     def read_setup(self, context):
         """Coroutine (core/coroutines.py) that reads the vertex groups, and makes `setup`."""
@@ -136,6 +143,20 @@ def style_term(settings, space, where):
 
 def uses_handles(settings, kind):
     return kind == "DEFORM" or (kind == "STYLIZE" and settings.stylize.use_handles)
+
+
+def rest_frame(source, kind, in_place):
+    """The frame at which handles were placed on a surface that may move: its shape there is the one at rest,
+    wherever the scene is. None where the shape at hand is."""
+    settings = settings_of(source)
+    if (
+        settings.output != "WARP"
+        or not uses_handles(settings, kind)
+        or not has_motion_before(source, in_place)
+    ):
+        return None
+    known = (entry.frame for entry in empties.used(source) if entry.frame != UNKNOWN_FRAME)
+    return next(known, None)
 
 
 def has_motion_before(source, in_place):

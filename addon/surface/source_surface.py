@@ -137,15 +137,17 @@ def in_world_shape(splats, space, source):
     return splats
 
 
-def read_surface(context, source, in_place=False, *, exact=None, fit_operator=None, carrying=None):
+def read_surface(
+    context, source, in_place=False, *, exact=None, fit_operator=None, carrying=None, frame=None
+):
     """All of a source that the worker needs; UserError when it cannot be worked on. Main thread.
 
     `exact` and the arguments of `fit_operator` count before the object's settings. `carrying`
     (carried/carrying.py) is given for a solve: the samples are then as stiff as the source is painted, and
-    spread over what is carried together with it.
+    spread over what is carried together with it. `frame`: another than that at hand, whose shape is read.
     """
     context.view_layer.update()
-    mesh, settings = mesh_arrays.read(context, source, in_place), settings_of(source)
+    mesh, settings = mesh_arrays.read(context, source, in_place, frame), settings_of(source)
     space = space_of(world_matrix(source), source.name)
     vertices, below = space.to_solve(mesh.vertices), modifier_stack.before(source, in_place)
     return SourceSurface(

@@ -11,7 +11,7 @@ if IN_BLENDER:
     from support.blender.baking import EXACT, at, saved_animation, solved
     from support.blender.live import step
     from support.blender.panels import drawn
-    from support.blender.stacks import add_modifier
+    from support.blender.stacks import add_modifier, local_points
 
     import addon.animation.bake_job as bake_job
     from addon.core.runtime import jobs
@@ -120,3 +120,41 @@ def test_live_and_deform_put_the_field_back_and_a_bake_ends_live():
     assert not sessions.is_live(bar) and cache_modifier.is_playing(bar)
     bpy.ops.arapfields.deform(**scenes.QUICK)
     assert not cache_modifier.is_playing(bar) and bar.modifiers["ARAP Fields"].show_viewport
+
+
+@pytest.mark.parametrize("kind", ["ARMATURE", "keys"])
+def test_a_bake_and_live_do_not_depend_on_the_frame_at_which_they_begin(kind):
+    """Where the shape before the field is animated, the one at rest is that on which handles were placed."""
+    bar, scene = saved_animation()[0], bpy.context.scene
+    add_modifier(bar, kind)
+    bone = bar.modifiers["Armature"].object.pose.bones["Second"] if kind == "ARMATURE" else None
+    moved, path = (bone, "rotation_euler") if bone else (bar.data.shape_keys.key_blocks["Wide"], "value")
+    for frame, value in ((1, 0.0), (5, 1.0)):
+        setattr(moved, path, (0.0, 0.0, value) if bone else value)
+        moved.keyframe_insert(path, frame=frame)
+    baked = []
+    for pressed in (1, 4):
+        scene.frame_set(pressed)
+        assert bpy.ops.arapfields.bake(format="PC2", start=1, end=5) == {"FINISHED"}
+        baked.append([at(bar, frame) for frame in (1, 3, 5)])
+    assert np.array_equal(*baked)
+    scene.frame_set(4)
+    sessions.begin(bpy.context, bar)
+    for frame, points in zip((1, 3, 5), baked[0], strict=True):
+        scene.frame_set(frame)
+        step(refined=True)
+        assert np.abs(local_points(bar) - points).max() < EXACT
+
+
+def test_live_begun_at_another_frame_leaves_unkeyed_poses_alone():
+    bar, scene = saved_animation()[0], bpy.context.scene
+    add_modifier(bar, "ARMATURE")
+    bone = bar.modifiers["Armature"].object.pose.bones["Second"]
+    bone.keyframe_insert("rotation_euler", frame=1)
+    scene.frame_set(4)
+    bone.rotation_euler.z = 1.1
+    bpy.context.view_layer.update()
+    sessions.begin(bpy.context, bar)
+    step()
+    assert abs(bone.rotation_euler.z - 1.1) < 1e-6 and scene.frame_current == 4
+    assert len(bpy.data.scenes) == 1 and local_points(bar)[:, 1].max() > 0.6

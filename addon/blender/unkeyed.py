@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Data-blocks as they are while a scene of ours evaluates them at another frame.
+
+Blender writes what it has evaluated last, in whatever scene, back to the file's own data: poses that are not
+keyed yet would be lost.
+"""
+
+import contextlib
+
+from .actions import curves_of
+from .evaluation import updated
+
+
+@contextlib.contextmanager
+def kept(context, items):
+    """Puts what is animated of these data-blocks back at the end, and evaluates them as they were."""
+    before = [(item, path, value_at(item, path)) for item in items for path in keyed(item)]
+    try:
+        yield
+    finally:
+        for item, path, value in before:
+            if value is not None and value_at(item, path) != value:
+                put_at(item, path, value)
+        for item in items:
+            item.update_tag()
+        if items:
+            updated(context.view_layer)
+
+
+def keyed(item):
+    """The paths of a data-block's properties that actions move."""
+    data = getattr(item, "animation_data", None)
+    if data is None:
+        return set()
+    strips = [strip.action for track in data.nla_tracks for strip in track.strips]
+    actions = [action for action in (data.action, *strips) if action is not None]
+    return {curve.data_path for action in actions for curve in curves_of(action)}
+
+
+def value_at(item, path):
+    """A copy of the value at a path; None where there is none."""
+    try:
+        value = item.path_resolve(path)
+    except ValueError:
+        return None
+    return tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
+
+
+def put_at(item, path, value):
+    owner, _, name = path.rpartition("[" if path.endswith("]") else ".")
+    owner = item.path_resolve(owner) if owner else item
+    if path.endswith("]"):
+        owner[name[1:-2]] = value  # a custom property
+    else:
+        setattr(owner, name, value)
