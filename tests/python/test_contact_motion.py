@@ -89,6 +89,18 @@ def test_a_drag_onto_a_ball_ends_where_more_steps_end(samples):
     assert held.handle == 1 and held.by == "obstacles[0]"
 
 
+def test_a_drag_onto_an_edge_goes_on_as_it_went():
+    """Each step starts one step further than the last one. 102 iterations, and 236 from where that ended."""
+    case = contact_cases.pressed_bar("edge")
+    samples = af.sample_surface(contact_cases.BODIES["bar"], 6000, seed=0)
+    live = af.LiveDeformer(samples, case.handles, contact=case.contact())
+    iterations = 0
+    for share in np.linspace(0, 1, 49)[1:]:
+        live.follow(case.pose(share))
+        iterations += live.report.iterations
+    assert live.report.contact.held and iterations < 160
+
+
 def test_legs_that_a_drag_has_crossed_come_back():
     """On the way back the feet meet and hold each other apart, where a solve from rest has none crossed."""
     (case,) = [case for case in contact_cases.figures() if case.name == "legs crossed 1"]

@@ -133,7 +133,7 @@ bool ContactSolve::comes_apart() {
   }
   const bool rests = way() == 0.0;
   const bool again = s.tried.targets.rows() == targets.rows();
-  const double tried_within = rests ? 0.0 : ContactApproach::usual.length_itself;
+  const double tried_within = rests ? 0.0 : ContactApproach::usual.length;
   if (again && (targets - s.tried.targets).rowwise().norm().maxCoeff() <= tried_within) return false;
   const double value = value_without_contact(s);
   Before before(s);
