@@ -2,7 +2,6 @@
 #include "energies/contact.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace arapfields {
@@ -12,8 +11,6 @@ namespace {
 constexpr double least_curvature = 0.1;
 /// Steps of Newton's method, which stay within an interval.
 constexpr int line_steps = 8;
-/// Share of a step that Newton's method leaves.
-constexpr double line_rest = 1e-9;
 
 }  // namespace
 
@@ -77,9 +74,8 @@ double contact_step(const std::vector<ContactPlane>& planes, double stiffness, c
     const double along = other_slope + t * other_curvature + first;
     if (t == 1.0 && along <= 0.0) return 1.0;
     (along > 0.0 ? high : low) = t;
-    const double next = t - along / (other_curvature + second);
-    if (std::abs(next - t) < line_rest) return std::min(next, 1.0);
-    t = next > low - line_rest && next < high + line_rest ? std::clamp(next, low, high) : 0.5 * (low + high);
+    t -= along / (other_curvature + second);
+    if (!(t > low && t < high)) t = 0.5 * (low + high);
   }
   return t;
 }
