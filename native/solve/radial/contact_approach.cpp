@@ -140,14 +140,13 @@ void ContactApproach::solve_to_targets(const std::vector<Mat4>& motions, bool to
   RadialState& s = state_;
   const Index in_a_round = to_its_end ? steps_to_the_end : steps_between;
   Index left = iterations_, extra = more_rounds;
-  bool is_first = true;
   double last = std::numeric_limits<double>::infinity(), least = last;
   for (;;) {
     s.objective(s.fast);
     const PointsF places = to_its_end ? sample_places(s) : PointsF();
     set_reachable_targets(s, motions);
     const RowMatrix<double> here = s.shape.coefficients;
-    if (std::exchange(is_first, false) && start != nullptr) *start = s.extrapolate();
+    if (start != nullptr && left == iterations_) *start = s.extrapolate();
     const Index at_once = std::clamp<Index>(left, 2, in_a_round);
     const bool converged = solve_round(here, at_once);
     left -= at_once;
