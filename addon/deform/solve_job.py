@@ -23,7 +23,8 @@ from ..live.sessions import end_for_job
 from ..poses import applying
 from ..results import placement, visibility
 from ..results.placement import SolvedMesh, destination, placement_refusal
-from ..surface.source_surface import read_surface
+from ..solver.source_reader import points_now, read_at_rest
+from ..surface.points_before import PointsBefore
 from ..viewport.previews import Preview
 from .first_result import FirstResult
 
@@ -42,7 +43,9 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
     exact = effective_value("surface", settings, operator) == "EXACT"
     extraction = {name: effective_value(name, settings, operator) for name in ("resolution", "refine_thin")}
     carrying, in_place = Carrying(context, source), placement.in_place(output, result)
-    surface = read_surface(context, source, in_place, exact=exact, carrying=carrying)
+    further = {"exact": exact, "carrying": carrying}
+    surface, is_at_hand = read_at_rest(context, source, kind, in_place, output, **further)
+    placed = PointsBefore(surface, surface.local if is_at_hand else points_now(context, source, surface))
     carried = carrying.poses(surface.space, depsgraph_of(context))
     preview = None
     if operator.in_window:
@@ -59,10 +62,12 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
             after, topology, figures = surface.extract_moved(tracker, field, **extraction)
             report |= figures
         else:
-            before = surface.vertices
+            before = placed.now
             if output == "SURFACE":
                 before, topology = surface.extract(tracker, 0.1, **extraction)
-            after = field(before)
+                after = field(before)
+            else:
+                after = placed.moved(field(surface.vertices), field)
         if not np.isfinite(after).all():
             raise UserError("The result has vertices that are not finite; try other settings")
         moves, place = np.eye(4), None
@@ -70,12 +75,13 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
             moves = similarity(before, after)
             after = transform(inverse(moves), after)
             place = surface.space.solve_to_world @ moves @ surface.space.local_to_solve
-        turns = surface.turns(field, before, moves) if placement.keeps_mesh(output, result) else None
+        takes_turns = placement.keeps_mesh(output, result)
+        turns = surface.turns(field, surface.vertices, moves) if takes_turns else None
         changes = surface.splat_changes(field)[1] if surface.in_place else None
         moved = carrying.moved(native.library(), points, field, carried)
         local = surface.space.to_local(after)
         if output == "WARP":
-            local = surface.space.moved_to_local(after, before, surface.local)
+            local = surface.space.moved_to_local(after, before, placed.local)
         pose = Pose(field, points, surface.space.local_to_solve)
         return SolvedMesh(local, topology, report, turns, changes, moved, place), pose
 
@@ -86,7 +92,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
         owner = surface.reference.get()
         if result != "NEW":
             operator.gone = tuple(one for one in operator.gone if one[0].uid != surface.reference.uid)
-        item = placement.place_result(bpy.context, owner, kind, output, result, solved, surface.local)
+        item = placement.place_result(bpy.context, owner, kind, output, result, solved, placed.local)
         if solved.place is not None:
             placement.put(bpy.context, item, solved.place)
         applying.solved[owner.session_uid] = pose

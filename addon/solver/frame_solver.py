@@ -11,6 +11,7 @@ from ..core.geometry.edges import Topology
 from ..core.runtime import native
 from ..core.settings.parameters import presets
 from ..handles.native_handles import native_handles
+from ..surface.points_before import PointsBefore
 from .contact import native_contact
 from .request import Request
 from .setup import at_samples
@@ -46,12 +47,9 @@ class FrameSolver:
     def __init__(self, sampled, carrying, handles=None, energy=None):
         setup = sampled.setup
         self.sampled, self.carrying = sampled, carrying
-        self.solver = self.points = self.rest = None
+        self.solver = None
         handles = setup.handles if handles is None else handles
-        if sampled.topology is None:
-            self.set_points(setup.surface.local, setup.surface.vertices)
-        else:
-            self.rest = sampled.rest
+        self.set_points(setup.surface.local)
         self._make_solver(handles, setup.energy if energy is None else energy)
 
     shows_touch = False  # whether shapes say where they touch
@@ -64,13 +62,19 @@ class FrameSolver:
         """This solver for another setup with the same surface and energy, read anew."""
         masses = at_samples(setup, setup.masses, self.sampled.samples)
         self.sampled, self.carrying = replace(self.sampled, setup=setup, masses=masses), carrying
-        self.set_points(setup.surface.local, setup.surface.vertices)
+        self.set_points(setup.surface.local)
         return self
 
-    def set_points(self, points, rest):
-        """(n, 3) points of the source to be moved, in local coordinates and in solve space."""
-        self.points, self.rest = points, rest
+    def set_points(self, points):
+        """(n, 3) points of the source that the field moves, in local coordinates."""
+        self.before = PointsBefore(self.sampled.setup.surface, points)
         self._single = np.asarray(points, dtype=np.float32)
+
+    @property
+    def rest(self):
+        """(n, 3) what the field is evaluated on, in solve space."""
+        is_of_source = self.sampled.topology is None
+        return self.sampled.setup.surface.vertices if is_of_source else self.sampled.rest
 
     def _make_solver(self, handles, energy):
         """A native solver for these handles and weights of the energy's terms, which moves nothing yet."""
@@ -107,9 +111,8 @@ class FrameSolver:
 
     def apply_request(self, request, task=None):
         """Has the native solver know all of a request but where its handles are; returns that."""
-        if request.points is not self.points and self.sampled.topology is None:
-            self.set_points(request.points, self.sampled.setup.surface.space.to_solve(request.points))
-            self._track()
+        if request.points is not self.before.local and self.sampled.topology is None:
+            self.set_points(request.points)
         if request.energy != self.energy:
             self._make_solver(request.handles, request.energy)
         if request.handles is not self.handles:
@@ -169,6 +172,7 @@ class FrameSolver:
     def _shape(self, request, solved):
         surface, topology = self.sampled.setup.surface, self.sampled.topology
         needs_field = request.carried or surface.has_free_normals or surface.splats is not None
+        needs_field = needs_field or self.before.needs_field
         moved = self.solver.field if needs_field else None
         carried = self.carrying.moved(native.library(), self.sampled.samples, moved, request.carried)
         if topology is not None:
@@ -176,10 +180,11 @@ class FrameSolver:
         turns = surface.turns(moved, self.rest) if surface.in_place else None
         centers, changes = surface.splat_changes(moved) if surface.in_place else (None, None)
         solved = centers if solved is None else solved
+        solved = self.before.moved(solved, moved)
         touching = self._touching(request, solved) if self.shows_touch else None
         # What does not move stays bit for bit.
-        points = in_single(surface.space.moved_to_local(require_finite(solved), self.rest, self.points))
-        return Shape(points, self._single, turns, changes, touching, carried=carried)
+        local = surface.space.moved_to_local(require_finite(solved), self.before.now, self.before.local)
+        return Shape(in_single(local), self._single, turns, changes, touching, carried=carried)
 
     def _touching(self, request, solved):
         """(k, 3) where a part of the points touches what the request's contact has, in local coordinates."""

@@ -43,15 +43,12 @@ class SourceReader:
         context.view_layer.update()
         self.reference, self.kind = ObjectReference(source), kind
         self.carrying = Carrying(context, source)
-        frame = rest_frame(source, kind, in_place)
-        frame = None if frame == context.scene.frame_current else frame
-        with unkeyed.kept(context, [] if frame is None else involved(source, kind)):
-            self.surface = read_surface(context, source, in_place, carrying=self.carrying, frame=frame)
+        self.surface, is_at_hand = read_at_rest(context, source, kind, in_place, carrying=self.carrying)
         self.moves_by_itself = in_place and has_motion_before(source, in_place)
         self.fingerprint = mesh_arrays.fingerprint(source.data)
         self.points = self.surface.local  # where the modifiers before have them now
         self.handles, self.setup = [], None
-        if frame is not None:
+        if not is_at_hand:
             self.read_points(context, source)
 
     def read_setup(self, context):
@@ -91,10 +88,7 @@ class SourceReader:
 
     def read_points(self, context, source):
         """Where the modifiers before have the points now: the field is evaluated there."""
-        with modifier_stack.evaluated_mesh(context, source, self.surface.in_place) as mesh:
-            points = mesh_arrays.positions(mesh)
-        if len(points) != len(self.points):
-            raise SourceChanged(source.name)
+        points = points_now(context, source, self.surface)
         if not np.array_equal(points, self.points):
             self.points = points
 
@@ -141,16 +135,33 @@ def style_term(settings, space, where):
     return StyleTerm(key, directions, strength, sharpness, style.up)
 
 
+def read_at_rest(context, source, kind, in_place, output=None, **further):
+    """(the surface at rest, whether that is the one at hand). `further`: of read_surface."""
+    frame = rest_frame(source, kind, in_place, output)
+    frame = None if frame == context.scene.frame_current else frame
+    with unkeyed.kept(context, [] if frame is None else involved(source, kind)):
+        return read_surface(context, source, in_place, frame=frame, **further), frame is None
+
+
+def points_now(context, source, surface):
+    """(n, 3) where the modifiers before have the points of a surface at the frame at hand."""
+    with modifier_stack.evaluated_mesh(context, source, surface.in_place) as mesh:
+        points = mesh_arrays.positions(mesh)
+    if len(points) != len(surface.local):
+        raise SourceChanged(source.name)
+    return points
+
+
 def uses_handles(settings, kind):
     return kind == "DEFORM" or (kind == "STYLIZE" and settings.stylize.use_handles)
 
 
-def rest_frame(source, kind, in_place):
+def rest_frame(source, kind, in_place, output=None):
     """The frame at which handles were placed on a surface that may move: its shape there is the one at rest,
-    wherever the scene is. None where the shape at hand is."""
+    wherever the scene is. None where the shape at hand is. `output`: another than the object's setting."""
     settings = settings_of(source)
     if (
-        settings.output != "WARP"
+        (output or settings.output) != "WARP"
         or not uses_handles(settings, kind)
         or not has_motion_before(source, in_place)
     ):

@@ -21,8 +21,8 @@ BY_HAND = 1e-5  # single precision of positions of size one
 KEYS_OFF = 0.02  # of a bar of two: what is shown is sampled anew, and handles rest at the frame at hand
 
 
-def test_the_field_is_evaluated_where_the_modifiers_before_have_the_points():
-    """The armature before it moves while live: the field stays, and moves the points where they are now."""
+def test_the_field_turns_what_the_modifiers_before_have_moved():
+    """The armature before it moves while live: the field stays, and each point turns about its rest."""
     bar, _, moving = scenes.bar_with_handles()
     add_modifier(bar, "ARMATURE")
     assert bpy.ops.arapfields.live() == {"FINISHED"}
@@ -35,8 +35,12 @@ def test_the_field_is_evaluated_where_the_modifiers_before_have_the_points():
         step(refined=True)
         with modifier_stack.evaluated_mesh(bpy.context, bar, in_place=True) as mesh:
             points = mesh_arrays.positions(mesh)
-        space, field = session.reader.surface.space, session.solver.field
-        expected = space.to_local(field(space.to_solve(points)))
+        surface, field = session.reader.surface, session.solver.field
+        left, _, right = np.linalg.svd(field.jacobian(surface.vertices))
+        offsets = surface.space.to_solve(points) - surface.vertices
+        assert not np.median(offsets, axis=0).any() and np.linalg.det(left @ right).min() > 0
+        after = field(surface.vertices) + np.einsum("nij,nj->ni", left @ right, offsets)
+        expected = surface.space.to_local(after)
         assert np.abs(local_points(bar) - expected).max() < BY_HAND
         assert np.abs(expected - points).max() > 0.2
     assert sessions.live[bar.session_uid] is session and len(bpy.data.scenes) == 1

@@ -4,6 +4,7 @@
 import numpy as np
 
 TINY = 1e-12
+STEPS, NEAR = 6, 1e-9  # of Newton's iteration, and the last one's size: its own square is left
 
 
 def turns(jacobians, local_to_solve):
@@ -12,9 +13,34 @@ def turns(jacobians, local_to_solve):
     `local_to_solve` is the (4, 4) map into the field's space. The turn is that of the closest rotation.
     """
     linear = np.asarray(local_to_solve)[:3, :3]
-    left, _, right = np.linalg.svd(np.linalg.inv(linear) @ jacobians @ linear)
+    return rotation_vectors(closest(np.linalg.inv(linear) @ jacobians @ linear)).astype(np.float32)
+
+
+def closest(matrices):
+    """(n, 3, 3) the rotations that are closest to matrices, of which most are near one.
+
+    Newton's iteration for the polar factor, X ← (X + X⁻ᵀ) / 2 (Higham 1986); by singular values where it has
+    not converged, or leads to a reflection. What is not finite stays so.
+    """
+    found = np.ascontiguousarray(np.moveaxis(matrices, 0, -1))
+    with np.errstate(all="ignore"):
+        for _ in range(STEPS):
+            before, (cofactors, determinants) = found, cofactors_of(found)
+            found = (before + cofactors / determinants) / 2
+        close = (np.abs(found - before).max(axis=(0, 1)) < NEAR) & (determinants > 0)
+    found = np.ascontiguousarray(np.moveaxis(found, -1, 0))
+    others = ~close & np.isfinite(matrices).all(axis=(1, 2))
+    left, _, right = np.linalg.svd(matrices[others])
     left[..., 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    return rotation_vectors(left @ right).astype(np.float32)
+    found[others] = left @ right
+    return found
+
+
+def cofactors_of(m):
+    """(3, 3, n) the cofactors of (3, 3, n) matrices, and (n,) their determinants."""
+    b, c = [1, 2, 0], [2, 0, 1]
+    crosses = [m[i, b] * m[j, c] - m[i, c] * m[j, b] for i, j in ((1, 2), (2, 0), (0, 1))]
+    return np.stack(crosses), (m[0] * crosses[0]).sum(axis=0)
 
 
 def rotation_vectors(rotations):
