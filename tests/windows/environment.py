@@ -27,6 +27,8 @@ BLENDERS = {
     "3.11": ["bpy==4.5.15", "numpy==1.26.4"],
     "3.13": ["bpy==5.2.3", "numpy==2.1.3"],
 }
+# Blender 5.2 maps files by it, in placeholders, which Wine 8's lacks; without it, as Blender 4.5 does.
+NEWER = b"\0VirtualAlloc2\0"
 SECONDS = 5400  # of the tests of a folder
 
 
@@ -90,7 +92,10 @@ def python(version):
         folder.mkdir(parents=True)
         unpack_python(version, folder)
         chosen = ["--platform", "win_amd64", "--python-version", version, "--only-binary=:all:", "--no-deps"]
-        pip("install", *chosen, "--target", folder / "Lib/site-packages", *BLENDERS[version], "-r", listed)
+        site = folder / "Lib/site-packages"
+        pip("install", *chosen, "--target", site, *BLENDERS[version], "-r", listed)
+        blender = site / "bpy/__init__.pyd"
+        blender.write_bytes(blender.read_bytes().replace(NEWER, NEWER.replace(b"2", b"0")))
         ready.write_text(wanted)
     return folder
 
