@@ -65,6 +65,13 @@ class Playback:
         was_shown, self._shown = shape is self._shown, shape
         return None if was_shown else shape
 
+    def take_news(self):
+        """Whether more frames are solved than when this was asked before."""
+        has_news = self.frames is not None and self.frames.has_news
+        if has_news:
+            self.frames.has_news = False
+        return has_news
+
     def is_shown(self):
         """Whether what is shown is the frame's own shape, or no frame's shape is asked for."""
         return self.frames is None or not self._solver.is_playing or self._shown is not None

@@ -20,6 +20,7 @@ from ..results import placement
 from ..solver.source_reader import SourceChanged, uses_handles
 from .edits import Updates
 from .session import Session
+from .shown_scene import ShownScene
 from .stored import Kept
 
 INTERVAL = 1 / 60  # seconds between looks
@@ -35,6 +36,7 @@ class Sessions(dict):
     def __init__(self):
         # {number of a session that has ended: Former}; Blender undoes up to 256 steps.
         self.past = Kept(lambda former: former.display.arrays)
+        self.shown_scene = ShownScene()
         self.returning = {}  # session_uid of a source: Former, of which an undone step says that it is live
 
     def part_with(self, uid):
@@ -163,6 +165,7 @@ def stop_all():
 def update(context, wait=0.0, refined=False):
     """Looks at every live source once, waiting at most so many seconds for the shapes to follow."""
     return_all(context)
+    live.shown_scene.follow(context, live.values())
     for uid, session in list(live.items()):
         try:
             session.update(context)
@@ -241,9 +244,6 @@ def poll_live():
         return None
     if not live.is_rendering:
         update(bpy.context)
-        for session in live.values():
-            frames = session.playback.frames
-            if frames is not None and frames.has_news:
-                frames.has_news = False
-                redraw(bpy.context, "UI")
+        if any([session.playback.take_news() for session in live.values()]):
+            redraw(bpy.context, "UI")
     return INTERVAL

@@ -156,3 +156,23 @@ def test_a_drag_at_a_frame_goes_on_from_the_shape_at_hand():
     assert not session.solver.is_playing
     shift = (local_points(bar) - before)[before[:, 0] > 0.9]
     assert np.abs(shift.mean(axis=0)[1] - 0.2) < 0.05
+
+
+def test_a_window_that_comes_to_another_scene_shows_its_frame():
+    bar, window = turning(), bpy.context.window
+    one, other = bpy.context.scene, bpy.data.scenes.new("Other")
+    for item in one.objects:
+        other.collection.objects.link(item)
+    other.frame_set(30)
+    one.frame_set(15)
+    sessions.begin(bpy.context, bar)
+    heights = []
+    for scene in (one, other, one):
+        window.scene = scene
+        step(refined=True)
+        heights.append(scenes.world_points(bar)[:, 2].max())
+    other.frame_set(15)
+    window.scene = other
+    step(refined=True)
+    assert heights[0] == heights[2] == scenes.world_points(bar)[:, 2].max()
+    assert abs(heights[1] - heights[0]) > 0.1
