@@ -5,13 +5,15 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..blender import object_references
+from ..blender import modifier_stack, object_references
+from ..blender.language import translated
 from ..blender.object_references import owner_of, settings_of
 from ..blender.property_definitions import listeners
 from ..carried import carried_objects
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix
 from ..core.geometry.spaces import inverse
+from ..core.runtime import jobs
 from ..field_modifier import layers, motion
 from ..handles import empties, naming
 from ..live import sessions
@@ -92,6 +94,8 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
     layers.make_way_for_handle(source)
     settings, is_first = settings_of(source), not empties.used(source)
     place = places.find(context, source, location, radius, face, face_count)
+    if face is not None and np.linalg.norm(place.now - location) > radius:
+        warn_of_moves(source)
     if is_first:
         settings.keep_rest, settings.keep_beyond = True, KEPT * place.size
     now, rest = np.eye(4), np.eye(4)
@@ -102,6 +106,19 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
     entry.anchor = anchor
     select(context, empty)
     return entry
+
+
+def warn_of_moves(source):
+    """Says that a later modifier moves the shape that was clicked."""
+    later = list(source.modifiers)[modifier_stack.place(source) + 1 :]
+    moving = [one for one in later if one.show_viewport and one.type not in modifier_stack.REFINING]
+    if moving:
+        error = UserError(
+            "{name}: the modifier {modifier} moves the shape after the field; the pin stands on that before it",
+            source,
+            modifier=moving[-1].name,
+        )
+        jobs.add_message("WARNING", translated(error))
 
 
 def hold_turn(entry, holds):

@@ -14,6 +14,7 @@ if IN_BLENDER:
     from support.blender.pins import pin
 
     from addon.core.geometry.spaces import transform
+    from addon.core.runtime import jobs
     from addon.field_modifier import motion
     from addon.handles import empties
     from addon.handles.palette import PALETTE, free_colour
@@ -44,6 +45,24 @@ def test_a_pin_on_a_deformed_mesh_is_at_rest_where_its_place_was(turn):
     assert np.abs(placed[:3, 3] - now).max() < 1e-5
     turned = (world @ move @ np.linalg.inv(world))[:3, :3]
     assert np.abs(placed[:3, :3] - turned).max() < 1e-4
+
+
+def test_a_click_where_a_later_modifier_moves_the_shape_is_said():
+    """The pin stands on the shape before that modifier. One that but refines it says nothing."""
+    bar = scenes.bar()
+    pin(bar, (-1, 0, 0.25))
+    for kind, said in (("SUBSURF", []), ("DISPLACE", ["Displace"])):
+        modifier = bar.modifiers.new(kind.title(), kind)
+        if said:
+            modifier.direction, modifier.mid_level, modifier.strength = "Z", 0.0, 0.5
+        bpy.context.view_layer.update()
+        mesh = bar.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        face = max(mesh.polygons, key=lambda one: one.center.x)
+        jobs.forget_messages()
+        pin(bar, bar.matrix_world @ face.center, face=face.index, face_count=len(mesh.polygons))
+        found = [text for level, text in jobs.messages() if level == "WARNING"]
+        assert [name for name in said if any(f"modifier {name} moves" in text for text in found)] == said
+        assert len(found) == len(said)
 
 
 def test_a_known_face_decides_where_surfaces_touch():
