@@ -114,7 +114,7 @@ def warn_of_moves(source):
     moving = [one for one in later if one.show_viewport and one.type not in modifier_stack.REFINING]
     if moving:
         error = UserError(
-            "{name}: the modifier {modifier} moves the shape after the field; the pin stands on that before it",
+            "{name}: the modifier {modifier} moves the shape after the field; the pin stands before that",
             source,
             modifier=moving[-1].name,
         )

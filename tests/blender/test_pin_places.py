@@ -57,7 +57,7 @@ def test_a_click_where_a_later_modifier_moves_the_shape_is_said():
             modifier.direction, modifier.mid_level, modifier.strength = "Z", 0.0, 0.5
         bpy.context.view_layer.update()
         mesh = bar.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-        face = max(mesh.polygons, key=lambda one: one.center.x)
+        face = max(mesh.polygons, key=lambda one: one.center.z)
         jobs.forget_messages()
         pin(bar, bar.matrix_world @ face.center, face=face.index, face_count=len(mesh.polygons))
         found = [text for level, text in jobs.messages() if level == "WARNING"]
