@@ -76,7 +76,10 @@ class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
             own = []
             for shape, first in zip(read, firsts, strict=False):
                 rows = slice(first, first + len(shape.vertices))
-                own.append(shapes.fill_up(shape.own(weights[rows]), shape.kept, names, options.influences))
+                points = shape.own(shape.vertices)
+                own.append(
+                    shapes.fill_up(shape.own(weights[rows]), shape.kept, names, options.influences, points)
+                )
                 if shape.nearest is None:
                     weights[rows] = own[-1]
             if not options.correctives:

@@ -96,14 +96,22 @@ def nearest(vertices, points):
 
 
 def kept_weights(item, rig, groups):
-    """{bone: (own vertices,) weights} of the groups that stay: locked ones, or all where `groups` is KEEP."""
+    """{bone: (own vertices,) weights} of the groups that stay: locked ones, or all that hold any vertex where
+    `groups` is KEEP."""
     deforming = {bone.name for bone in rig.data.bones if bone.use_deform}
-    kept = [g for g in item.vertex_groups if g.name in deforming and (groups == "KEEP" or g.lock_weight)]
-    return vertex_groups.weights_in(item.data, {group.name: group.index for group in kept})
+    own = [group for group in item.vertex_groups if group.name in deforming]
+    locked = {group.name for group in own if group.lock_weight}
+    found = vertex_groups.weights_in(item.data, {group.name: group.index for group in own})
+    return {
+        name: weights
+        for name, weights in found.items()
+        if name in locked or (groups == "KEEP" and weights.any())
+    }
 
 
-def fill_up(weights, kept, names, influences):
-    """(n, bones) weights whose kept columns stay, and whose others share what these leave of one."""
+def fill_up(weights, kept, names, influences, points):
+    """(n, bones) weights whose kept columns stay, and whose others share what these leave of one. One of the
+    (n, 3) points that none of them holds is held as the nearest one that is."""
     if not kept:
         return weights
     fixed = [names.index(bone) for bone in kept]
@@ -113,6 +121,9 @@ def fill_up(weights, kept, names, influences):
     room = np.clip(influences - (held > 0).sum(axis=1), 1, influences)
     order = np.argsort(np.argsort(-result, axis=1, kind="stable"), axis=1)
     result[order >= room[:, None]] = 0.0
+    bare, others = ~(result.any(axis=1) | held.any(axis=1)), np.flatnonzero(result.any(axis=1))
+    if bare.any() and len(others):
+        result[bare] = result[others[nearest(points[others], points[bare])]]
     total, left = result.sum(axis=1), np.clip(1.0 - held.sum(axis=1), 0.0, 1.0)
     result *= (left / np.where(total > 0, total, 1.0))[:, None]
     result[:, fixed] = held

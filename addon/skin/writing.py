@@ -4,6 +4,7 @@
 Blender evaluates such formulas itself: they play where Python may not run, and without the extension.
 """
 
+import bpy
 import numpy as np
 
 from ..blender import mesh_arrays, vertex_groups
@@ -20,8 +21,13 @@ PRODUCTS = ("w*x", "w*y", "w*z", "x*x", "y*y", "z*z", "x*y", "x*z", "y*z")  # as
 def write_weights(item, names, weights, kept):
     """Puts (n, bones) weights into the bones' groups; those of `kept` stay as they are."""
     single_user(item)
-    for column, name in zip(np.asarray(weights).T, names, strict=True):
-        if name not in kept and (column.any() or name in item.vertex_groups):
+    columns = dict(zip(names, np.asarray(weights).T, strict=True))
+    used = {name for name, column in columns.items() if column.any() or name in item.vertex_groups}
+    if any(m.type == "MIRROR" and m.use_mirror_vertex_groups for m in item.modifiers):
+        # Mirror finds the other side's group by its name, and has no other where it is not there.
+        used |= {bpy.utils.flip_name(name) for name in used}
+    for name, column in columns.items():
+        if name in used and name not in kept:
             vertex_groups.put(item, name, column)
 
 

@@ -156,3 +156,32 @@ def test_a_linked_armature_poses_meshes_and_hidden_meshes_of_its_collection_too(
     assert body.parent == rig and len(body.vertex_groups) == 5 and not other.vertex_groups
     assert bpy.ops.arapfields.skin(scope="COLLECTION", poses=8, samples=1000) == {"FINISHED"}
     assert np.allclose(weights_of(other, list(body.vertex_groups.keys())).sum(axis=1), 1, atol=1e-5)
+
+
+def test_a_half_that_mirror_completes_follows_the_bones_of_its_own_side():
+    """Mirror gives the other side the groups of its names, which are there though the half has none of it."""
+    body, rig = person(half=True)
+    body.modifiers.new("Mirror", "MIRROR")
+    scenes.activate(body, rig)
+    assert bpy.ops.arapfields.skin(poses=8, samples=800) == {"FINISHED"}
+    rest, ways = scenes.world_points(body), []
+    for name in ("Shin.L", "Shin.R"):
+        rig.pose.bones[name].rotation_quaternion = (0.9, 0.4, 0, 0)
+        ways.append(np.linalg.norm(scenes.world_points(body) - rest, axis=1))
+        rig.pose.bones[name].rotation_quaternion = (1, 0, 0, 0)
+    left = rest[:, 0] > 0.01
+    assert ways[0][left].max() > 0.1 > 1e-3 > ways[0][~left].max()
+    assert ways[1][~left].max() > 0.1 > 1e-3 > ways[1][left].max()
+
+
+@pytest.mark.parametrize("kind", ["empty", "locked"])
+def test_no_vertex_is_left_without_a_bone(kind):
+    """Groups that hold nothing keep nothing, and what locked ones leave is held by others."""
+    body, rig = person()
+    for bone in rig.data.bones if kind == "empty" else (rig.data.bones["Shin.L"],):
+        body.vertex_groups.new(name=bone.name).lock_weight = kind == "locked"
+    scenes.activate(body, rig)
+    assert bpy.ops.arapfields.skin(groups="KEEP", poses=8, samples=800) == {"FINISHED"}
+    weights = weights_of(body, [bone.name for bone in rig.data.bones])
+    assert np.allclose(weights.sum(axis=1), 1, atol=1e-5)
+    assert weights_of(body, ["Shin.L"]).any() == (kind == "empty")
