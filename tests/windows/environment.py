@@ -53,6 +53,9 @@ def unpack_python(version, folder):
     compile_library(folder, "bcryptprimitives")
     if version != "3.11":  # whose NumPy asks for no function of complex numbers
         complete_runtime(folder)
+        own = folder / "Lib/site-packages/sitecustomize.py"
+        own.parent.mkdir(parents=True, exist_ok=True)
+        own.write_text("import _winapi\n\ndel _winapi.CopyFile2\n")  # Wine 8 lacks it; `shutil` does without
     (folder / "_wmi.pyd").unlink(missing_ok=True)  # asks for what Wine 8 lacks; `platform` does without
 
 
