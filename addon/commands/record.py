@@ -20,7 +20,9 @@ def described(verb, settings, version):
     description = {"version": version, "verb": verb}
     for name, value in sorted(settings.items()):
         is_file = isinstance(value, Path)
-        description[name] = digest(Path(value).read_text(encoding="utf-8")) if is_file else value
+        description[name] = (
+            digest(Path(value).read_text(encoding="utf-8", errors="surrogateescape")) if is_file else value
+        )
     return description
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Outputs that appear whole or not at all, and reports as JSON. Every file of ours is written by these."""
 
+import codecs
 import contextlib
 import json
 import math
@@ -41,6 +42,14 @@ def naming(output, path):
         if foreign or error.errno is None:
             raise
         raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def read_text(path, errors="strict"):
+    """The text of a file in UTF-8, also with the byte order mark that Windows' programs put first, or in
+    UTF-16 with one."""
+    with open(path, "rb") as file:
+        is_wide = file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    return Path(path).read_text(encoding="utf-16" if is_wide else "utf-8-sig", errors=errors)
 
 
 def write_text(path, text):

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading and writing meshes, point clouds, normals, SDFs and fields. Every error names the file."""
 
+import codecs
 import contextlib
+import io
 import logging
 import re
 from pathlib import Path
@@ -9,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import _native
-from .._files import existing_file, write_arrays
+from .._files import existing_file, read_text, write_arrays
 from .._interrupts import uninterrupted
 from .._native import InvalidInput, ObjectStyle
 
@@ -56,7 +58,14 @@ def read_mesh(path):
     path = existing_file(path, MESH_SUFFIXES)
     trimesh = _trimesh()
     with readable(path, path.suffix[1:].upper()):
-        mesh = trimesh.load(path, force="mesh", process=False, maintain_order=True, skip_materials=True)
+        mesh = trimesh.load(
+            _stream(path),
+            file_type=path.suffix[1:].lower(),
+            force="mesh",
+            process=False,
+            maintain_order=True,
+            skip_materials=True,
+        )
         vertices, triangles = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
     for name, rows in (("vertices", vertices), ("faces", triangles)):
         if len(rows) and (rows.ndim != 2 or rows.shape[1] != 3):
@@ -77,6 +86,14 @@ def read_mesh(path):
     if path.suffix.lower() == ".stl":
         vertices, triangles = _merged(vertices, triangles)
     return vertices, triangles.astype(np.int32)
+
+
+def _stream(path):
+    """The path; of text with a byte order mark, which trimesh takes for a part of a word, the text."""
+    with path.open("rb") as file:
+        is_marked = file.read(3).startswith((codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    is_text = path.suffix.lower() in (".obj", ".off")
+    return io.BytesIO(read_text(path, "replace").encode()) if is_marked and is_text else path
 
 
 def _merged(vertices, triangles):
@@ -107,7 +124,7 @@ def write_moved_mesh(path, source, mesh, move):
 
 def moved_obj(source, move):
     """The text of an OBJ file, its vertices moved; None where one is not finite."""
-    text = Path(source).read_text(encoding="utf-8", errors="surrogateescape")
+    text = read_text(source, "surrogateescape")
     text = re.sub(r"\\\r?\n", "", text)  # lines that go on in the next
     with readable(source, "OBJ"):
         before = np.array([[float(c) for c in m.groups()[1:]] for m in OBJ_VERTEX.finditer(text)])
@@ -157,7 +174,7 @@ def read_normals(path):
         if path.suffix.lower() == ".npy":  # mapped: its size is compared with the file's
             normals = np.array(np.lib.format.open_memmap(path, mode="r"), float)
         else:
-            normals = np.loadtxt(path.read_text(encoding="utf-8").replace(",", " ").splitlines(), ndmin=2)
+            normals = np.loadtxt(read_text(path).replace(",", " ").splitlines(), ndmin=2)
     if normals.ndim != 2 or normals.shape[1] != 3 or len(normals) == 0:
         raise InvalidInput(
             f"{path}: holds an array of shape {normals.shape}; rows of three numbers are needed"

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 
-from .._files import existing_file
+from .._files import existing_file, read_text
 from .._native import CuboidHandle, InvalidInput, PointHandle
 
 KEYS = {
@@ -22,7 +22,7 @@ def read_handles(path):
     """The handles' descriptions in a JSON file: a list, or an object whose `handles` is one."""
     path = existing_file(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_text(path))
     except (ValueError, RecursionError) as error:
         raise InvalidInput(f"{path}: not JSON ({error})") from error
     if isinstance(content, dict) and set(content) == {"handles"}:

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Points that a field moves: point sets, curves, and numbers for the vertices of a mesh."""
 
+import re
+
 import numpy as np
 
-from .._files import existing_file, write_arrays
+from .._files import existing_file, read_text, write_arrays
 from .._native import InvalidInput
 from .files import MESH_SUFFIXES, OBJ_VERTEX, _trimesh, moved_obj, read_mesh, readable, write_moved_mesh
 
@@ -44,13 +46,13 @@ def _with(path, suffixes, what):
 
 
 def _has_faces(path):
-    with readable(path, "OBJ"), path.open(encoding="utf-8", errors="surrogateescape") as file:
-        return any(line.lstrip().startswith("f ") for line in file)
+    with readable(path, "OBJ"):
+        return re.search(r"^[ \t]*f ", read_text(path, "surrogateescape"), flags=re.M) is not None
 
 
 def _write_obj(path, source, move):
     """Lines, curves and points of an OBJ file, which has no faces."""
-    text = source.read_text(encoding="utf-8", errors="surrogateescape")
+    text = read_text(source, "surrogateescape")
     if not OBJ_VERTEX.search(text):
         raise InvalidInput(f"{source}: has no vertices; points, curves or a mesh are needed")
     moved = moved_obj(source, move)
@@ -108,7 +110,7 @@ def read_numbers(path):
     """Rows of numbers of a .npy array, or of text with blanks or commas between."""
     if path.suffix.lower() == ".npy":
         return np.array(np.lib.format.open_memmap(path, mode="r"), float)
-    return np.loadtxt(path.read_text(encoding="utf-8").replace(",", " ").splitlines(), ndmin=2)
+    return np.loadtxt(read_text(path).replace(",", " ").splitlines(), ndmin=2)
 
 
 def read_weights(path, vertices):
@@ -118,7 +120,7 @@ def read_weights(path, vertices):
         if path.suffix.lower() == ".npy":
             numbers = np.array(np.lib.format.open_memmap(path, mode="r"), float)
         else:
-            numbers = np.loadtxt(path.read_text(encoding="utf-8").replace(",", " ").split(), ndmin=1)
+            numbers = np.loadtxt(read_text(path).replace(",", " ").split(), ndmin=1)
     if numbers.shape != (vertices,):
         raise InvalidInput(
             f"{path}: holds {numbers.size} numbers; one for each of the {vertices} vertices is needed"

@@ -7,7 +7,7 @@ import numpy as np
 
 import arapfields as af
 
-from .._files import existing_file, write_arrays
+from .._files import existing_file, read_text, write_arrays
 from . import files, verbs
 from .flags import MESH, stiffness_flags
 from .options import add_option_flags, given_options
@@ -78,7 +78,7 @@ def read_bones(path):
     """The bones of a .json file, whose parents are names."""
     path = existing_file(path, (".json",))
     with files.readable(path, "bones"):
-        rows = json.loads(path.read_text(encoding="utf-8"))
+        rows = json.loads(read_text(path))
         if not isinstance(rows, list) or not all(isinstance(row, dict) and "name" in row for row in rows):
             raise af.InvalidInput(f"{path}: a list of bones with names is needed")
         numbers = {row["name"]: index for index, row in enumerate(rows)}

@@ -7,7 +7,7 @@ import zipfile
 
 import numpy as np
 
-from .._files import existing_file
+from .._files import existing_file, read_text
 from .._native import InvalidInput, require_memory
 from .files import readable
 from .handles import build_handles
@@ -60,7 +60,7 @@ def read_tracks(path):
 
 def _of_json(path):
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_text(path))
     except (ValueError, RecursionError) as error:
         raise InvalidInput(f"{path}: not JSON ({error})") from error
     if not isinstance(content, dict) or not isinstance(content.get("handles"), list):

@@ -8,7 +8,7 @@ import numpy as np
 
 import arapfields as af
 
-from .._files import existing_file
+from .._files import existing_file, read_text
 from . import files, sources, verbs, wrap_folder, wrap_sequence
 from .flags import SOURCE, report_flag, sdf_flag, stiffness_flags
 from .handles import triple
@@ -144,7 +144,7 @@ def read_landmarks(path):
     path = existing_file(path, LANDMARKS)
     with files.readable(path, "pairs of places"):
         if path.suffix.lower() == ".json":
-            rows = np.array(json.loads(path.read_text(encoding="utf-8")), float)
+            rows = np.array(json.loads(read_text(path)), float)
         else:
             rows = read_numbers(path)
     if rows.size == 0:
