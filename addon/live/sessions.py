@@ -71,6 +71,7 @@ def begin(context, source, kind="DEFORM", keeps_shape=False):
 
     `keeps_shape`: what is shown stays when live mode ends.
     """
+    live.shown_scene.follow(context, live.values())
     end_for_kind(context, source, kind)
     live.begun = source.session_uid
     earlier, session = live.part_with(source.session_uid), None

@@ -176,3 +176,19 @@ def test_a_window_that_comes_to_another_scene_shows_its_frame():
     step(refined=True)
     assert heights[0] == heights[2] == scenes.world_points(bar)[:, 2].max()
     assert abs(heights[1] - heights[0]) > 0.1
+
+
+def test_live_mode_begun_in_another_scene_leaves_unkeyed_places_alone():
+    bar, moving = turning(), bpy.data.objects["Moving"]
+    sessions.begin(bpy.context, bar)
+    step()
+    sessions.end(bpy.context, bar)
+    other = bpy.data.scenes.new("Other")
+    for item in bpy.context.scene.objects:
+        other.collection.objects.link(item)
+    bpy.context.window.scene = other
+    moving.location.z = 0.5
+    bpy.context.view_layer.update()
+    sessions.begin(bpy.context, bar)
+    step(refined=True)
+    assert moving.location.z == 0.5
