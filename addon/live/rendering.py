@@ -53,9 +53,7 @@ def warn_of_hidden(source, session, depsgraph):
     if settings_of(source).contact.use:
         hidden += [item.name for item, _ in obstacles_of(source) if item.session_uid not in visible]
     if hidden:
-        text = translated(
-            "{names} is hidden in renders, which therefore do not follow it", names=", ".join(hidden)
-        )
+        text = translated("Renders do not follow what is hidden in them: {names}", names=", ".join(hidden))
         message = "WARNING", f"{source.name}: {text}"
         if message not in jobs.messages():
             jobs.add_message(*message)

@@ -229,7 +229,7 @@ def test_an_animated_obstacle_is_the_same_in_playback_bake_and_render():
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 2, 3
     bpy.context.scene.render.filepath = cache_file()
     bpy.ops.render.render(animation=True)
-    assert any("hidden in renders" in text for _, text in jobs.messages())
+    assert any("hidden in them" in text for _, text in jobs.messages())
 
 
 def test_the_pin_tool_has_the_switch_where_there_are_handles():

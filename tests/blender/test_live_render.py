@@ -76,7 +76,7 @@ def test_a_handle_hidden_in_renders_is_said():
     scene.frame_start, scene.frame_end, scene.render.filepath = 1, 2, tempfile.mkdtemp() + "/frame"
     bpy.ops.render.render(animation=True)
     said = [text for _, text in jobs.messages()]
-    assert said == ["Bar: Moving is hidden in renders, which therefore do not follow it"]
+    assert said == ["Bar: Renders do not follow what is hidden in them: Moving"]
 
 
 def test_a_file_looks_the_same_without_the_extension():
