@@ -27,7 +27,7 @@ class CarriedObject:
         if isinstance(self.carrier, BonesCarrier):
             self.carrier.take_base(item, entry)
         self.may_be_edited = False
-        self.attached = None  # (points, rest, Attachment); the worker's
+        self.attached = None  # (points, PointsBefore, rest, PointsBeside, Attachment); the worker's
 
     def moves_by_itself(self, item):
         """Whether its points move without an edit of its data."""

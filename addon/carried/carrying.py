@@ -113,20 +113,29 @@ class Carrying:
 
     # On a worker.
 
-    def moved(self, af, samples, field, poses, strength=1.0):
-        """[(carried object, what its carrier writes)] where the field takes them, so much of the way."""
-        moved = [(pose.carried, self.moved_one(af, samples, field, pose, strength)) for pose in poses]
+    def moved(self, af, samples, field, poses, strength=1.0, before=None):
+        """[(carried object, what its carrier writes)] where the field takes them, so much of the way.
+
+        `before`: PointsBefore of the body (surface/points_before.py), where those may have moved.
+        """
+        before = None if before is None or before.is_at_rest else before
+        moved = [(pose.carried, self.moved_one(af, samples, field, pose, strength, before)) for pose in poses]
         return [pair for pair in moved if pair[1] is not None]
 
-    def moved_one(self, af, samples, field, pose, strength=1.0):
+    def moved_one(self, af, samples, field, pose, strength=1.0, before=None):
         carried = pose.carried
         if carried is self.nodes:
             return self.rows_of_nodes(field, pose.rest, strength)
         attached = carried.attached
-        if attached is None or attached[0] is not pose.points or not near(attached[1], pose.rest):
-            attachment = af.Attachment(samples, transform(pose.rest, pose.points))
-            attached = carried.attached = pose.points, pose.rest, attachment
-        after = np.asarray(attached[2].positions(field))
+        is_same = attached is not None and attached[0] is pose.points and attached[1] is before
+        if not is_same or not near(attached[2], pose.rest):
+            points = transform(pose.rest, pose.points)
+            beside = None if before is None else before.beside(points)
+            attachment = af.Attachment(samples, points if beside is None else beside.at_rest)
+            attached = carried.attached = pose.points, before, pose.rest, beside, attachment
+        *_, beside, attachment = attached
+        after = np.asarray(attachment.positions(field))
+        after = after if beside is None else beside.moved(after, field)
         if not np.isfinite(after).all():
             raise UserError("The shape has vertices that are NaN or infinite; move the handles less far")
         if strength != 1.0:

@@ -78,7 +78,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
         takes_turns = placement.keeps_mesh(output, result)
         turns = surface.turns(field, surface.vertices, moves) if takes_turns else None
         changes = surface.splat_changes(field)[1] if surface.in_place else None
-        moved = carrying.moved(native.library(), points, field, carried)
+        moved = carrying.moved(native.library(), points, field, carried, before=placed)
         local = surface.space.to_local(after)
         if output == "WARP":
             local = surface.space.moved_to_local(after, before, placed.local)

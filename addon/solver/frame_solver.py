@@ -174,7 +174,9 @@ class FrameSolver:
         needs_field = request.carried or surface.has_free_normals or surface.splats is not None
         needs_field = needs_field or self.before.needs_field
         moved = self.solver.field if needs_field else None
-        carried = self.carrying.moved(native.library(), self.sampled.samples, moved, request.carried)
+        further = {"before": self.before} if topology is None else {}
+        samples = self.sampled.samples
+        carried = self.carrying.moved(native.library(), samples, moved, request.carried, **further)
         if topology is not None:
             return Shape(self.to_local(solved), None, topology=topology, carried=carried)
         turns = surface.turns(moved, self.rest) if surface.in_place else None

@@ -79,6 +79,30 @@ def test_live_bakes_and_deform_agree_beside_an_animated_pose(pose):
     assert np.abs(shapes[0] - before).max() > 0.3  # the handle has moved it
 
 
+def test_clothes_stay_beside_a_posed_body():
+    """They are posed by the same armature, and carried; live, in a job and in a bake."""
+    bar = posed("rotation_euler", (0.0, 0.0, 1.0))
+    bpy.context.scene.frame_set(1)
+    coat = bar.copy()
+    coat.data, coat.name = bar.data.copy(), "Coat"
+    coat.arapfields.handles.clear()
+    bpy.context.collection.objects.link(coat)
+    scenes.set_positions(coat.data, local_points(bar) * (1.02, 1.1, 1.1))
+    scenes.activate(coat, bar)
+    assert bpy.ops.arapfields.carry(way="FOLLOW") == {"FINISHED"}
+    bpy.context.scene.frame_set(4)
+    rest = np.linalg.norm(scenes.world_points(coat) - scenes.world_points(bar), axis=1)
+    sessions.begin(bpy.context, bar)
+    step(refined=True)
+    gaps = [scenes.world_points(coat) - scenes.world_points(bar)]
+    sessions.end(bpy.context, bar)
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.deform(field="radial", samples=4000) == {"FINISHED"}
+    gaps.append(scenes.world_points(coat) - scenes.world_points(bar))
+    for gap in gaps:
+        assert np.abs(np.linalg.norm(gap, axis=1) - rest).max() < 0.02
+
+
 def test_points_turn_with_the_field_at_their_rest():
     rng = np.random.default_rng(3)
     rest, q = rng.normal(size=(50, 3)), np.linalg.qr(rng.normal(size=(3, 3)))[0]
