@@ -2,6 +2,7 @@
 #include "energies/contact.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace arapfields {
@@ -11,6 +12,8 @@ namespace {
 constexpr double least_curvature = 0.1;
 /// Steps of Newton's method, which stay within an interval.
 constexpr int line_steps = 8;
+/// Share of a step that Newton's method leaves.
+constexpr double line_rest = 1e-9;
 
 }  // namespace
 
@@ -74,8 +77,9 @@ double contact_step(const std::vector<ContactPlane>& planes, double stiffness, c
     const double along = other_slope + t * other_curvature + first;
     if (t == 1.0 && along <= 0.0) return 1.0;
     (along > 0.0 ? high : low) = t;
-    t -= along / (other_curvature + second);
-    if (!(t > low && t < high)) t = 0.5 * (low + high);
+    const double next = t - along / (other_curvature + second);
+    if (std::abs(next - t) < line_rest) return std::min(next, 1.0);
+    t = next > low - line_rest && next < high + line_rest ? std::clamp(next, low, high) : 0.5 * (low + high);
   }
   return t;
 }

@@ -13,9 +13,9 @@ SIZE = 4.0
 # Shares of the size between the farthest two of the poses. Over an edge of the block the bar slides for
 # long; .031 of 16 poses where rounds were short and ended early, .0021 on the ball.
 SPREADS = {"ball": (BALL, 0.0015), "block": (BLOCK, 0.01)}
-# A plate that sweeps may leave one pose elsewhere: of 32 one was .008 from the others, which were within
-# .0012. Where rounds were short, most were .002 to .009 from each other.
-ON_A_PLATE, ELSEWHERE = 0.002, 1
+# Of 32 poses at most .0005 from the median. Where what the plate's edge passed was taken to have come to its
+# other side, three were .004 to .008; where solves beside it ended early, one in 48.
+ON_A_PLATE = 0.002
 
 
 @pytest.fixture(scope="module")
@@ -23,16 +23,13 @@ def samples():
     return bar_samples(16000)
 
 
-def spread(pose_of, seeds=8, elsewhere=0):
-    """How far poses of jittered handles are from each other, as a share of the size, without so many that are
-    farthest from the median."""
+def spread(pose_of, seeds=8):
+    """How far poses of jittered handles are from each other, as a share of the size."""
     rows = []
     for seed in range(seeds):
         rng = np.random.default_rng(seed)
         rows.append(pose_of([turned(0, shift=JITTER * rng.normal(size=3)) for _ in range(2)]))
-    away = np.abs(rows - np.median(rows, axis=0)).max(axis=(1, 2))
-    kept = np.argsort(away)[: seeds - elsewhere]
-    return np.ptp(np.array(rows)[kept], axis=0).max() / SIZE
+    return np.ptp(np.array(rows), axis=0).max() / SIZE
 
 
 @pytest.mark.parametrize("name", SPREADS)
@@ -60,4 +57,4 @@ def test_a_plate_that_sweeps_a_bar_along_leaves_it_alike(samples):
             field = swept.solve(iterations=60)
         return field(samples.points)
 
-    assert spread(pose_of, elsewhere=ELSEWHERE) < ON_A_PLATE
+    assert spread(pose_of) < ON_A_PLATE

@@ -16,8 +16,8 @@ namespace {
 
 /// How far an obstacle moves in a step, in cube units.
 constexpr double obstacle_step = 0.02;
-/// Quasi-Newton steps between two searches for planes.
-constexpr Index steps_between = 6;
+/// Quasi-Newton steps between two searches for planes, and what a search counts for at least.
+constexpr Index steps_between = 6, least_at_once = 2;
 /// Solves of so many iterations whose handles or obstacles come from far go on to their end, where rounding
 /// changes less: so many quasi-Newton steps each time, until a round moves no sample
 /// farther, in cube units. Not where the surface meets itself: handles that meet would stop each other.
@@ -95,9 +95,10 @@ void ContactApproach::sweep(const std::vector<Mat4>& motions) {
   const auto wanted = static_cast<Index>(std::ceil(s.contact.obstacle_way() / obstacle_step));
   const Index steps = std::clamp<Index>(wanted, 1, usual.most_steps);
   const Index at_once = goes_to_its_end() ? steps_to_the_end : usual.iterations;
+  swept_ = steps > 1;
   s.precondition(0.0);
   for (Index k = 1; k <= steps; ++k) {
-    s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(steps));
+    s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(steps), true);
     find_and_push(1, too_deep);
     if (k == steps || !s.contact.presses()) continue;
     s.objective(s.fast);
@@ -115,7 +116,7 @@ void ContactApproach::approach(const std::vector<Mat4>& motions, double way, con
 void ContactApproach::approach_by(const std::vector<Mat4>& motions, Index steps, Index on_the_way) {
   RadialState& s = state_;
   s.precondition(0.0);
-  const bool to_its_end = steps > 1 && goes_to_its_end();
+  const bool to_its_end = (steps > 1 || swept_) && goes_to_its_end();
   if (to_its_end) on_the_way = steps_to_the_end;
   s.contact.find(s.shape.coefficients);
   SolveHistory::Start start{s.shape.coefficients, {}};
@@ -147,9 +148,10 @@ void ContactApproach::solve_to_targets(const std::vector<Mat4>& motions, bool to
     set_reachable_targets(s, motions);
     const RowMatrix<double> here = s.shape.coefficients;
     if (start != nullptr && left == iterations_) *start = s.extrapolate();
-    const Index at_once = std::clamp<Index>(left, 2, in_a_round);
+    const Index at_once = std::clamp<Index>(left, least_at_once, in_a_round);
+    const Index before = s.report.iterations;
     const bool converged = solve_round(here, at_once);
-    left -= at_once;
+    left -= to_its_end ? std::max(least_at_once, s.report.iterations - before) : at_once;
     const double depth = s.contact.deepest();
     const bool rests = !to_its_end || (sample_places(s) - places).rowwise().norm().maxCoeff() < at_rest;
     if (converged && depth < deep && rests) return;

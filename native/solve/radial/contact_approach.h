@@ -46,6 +46,7 @@ class ContactApproach {
   Index iterations_;
   double tolerance_;
   const Progress& progress_;
+  bool swept_ = false;  // obstacles came from far
 };
 
 }  // namespace arapfields

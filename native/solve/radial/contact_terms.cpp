@@ -54,6 +54,13 @@ void go_back(const BarrierSurface& surface, PointsIn now, const std::vector<Inde
   }
 }
 
+/// What an edge has passed is not taken to have come to its other side.
+void hold_behind(const std::vector<BarrierSurface::Hit>& hits, const std::vector<Index>& rows,
+                 Vector& distances) {
+  for (std::size_t m = 0; m < rows.size(); ++m)
+    if (hits[m].share <= 1.0) distances[rows[m]] = std::min(0.0, distances[rows[m]]);
+}
+
 /// Samples between which and their neighbours an edge of an obstacle may poke through.
 std::vector<Index> at_edges(const ContactSet& found, ContactPoints& points,
                             const std::vector<BarrierSurface>& surfaces) {
@@ -206,6 +213,7 @@ double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<d
     find_outside(rows);
   }
   deepest_outside_ = deepest_;
+  ahead_ = false;
   if (self_) add_own_planes(coefficients, jumped);
   gather_places();
   return deepest_;
@@ -217,14 +225,13 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
   const BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
   const Points& seen = ways_.seen[static_cast<std::size_t>(k)];
   BarrierSurface::Nearest nearest = surface.nearest(now);
-  std::vector<Index> moved_rows;  // those that may have come through
+  std::vector<Index> moved_rows, starts;  // those that may have come through, and of all places
   for (Index i = 0; i < now.rows(); ++i) {
     const Index row = rows[static_cast<std::size_t>(i)];
     const double way = (now.row(i) - seen.row(row)).norm(), clear = ways_.clear(row, k);
-    if (clear > 0.0 && way > clear + std::max(0.0, nearest.distances[i]) - unsure) moved_rows.push_back(i);
+    if (clear > 0.0 && way > clear + std::max(0.0, nearest.distances[i]) - unsure)
+      moved_rows.push_back(i), starts.push_back(row);
   }
-  std::vector<Index> starts;
-  for (const Index i : moved_rows) starts.push_back(rows[static_cast<std::size_t>(i)]);
   const std::vector<BarrierSurface::Hit> hits =
       surface.first_hits(rows_of(seen, starts), rows_of(now, moved_rows));
   Vector offsets(now.rows());
@@ -260,6 +267,7 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
     }
     anchor = plane.anchor.transpose();
   }
+  if (ahead_) hold_behind(hits, moved_rows, nearest.distances);
   return nearest.distances;
 }
 

@@ -36,15 +36,14 @@ class ContactTerms {
   void resume(const ContactState& state, const RowMatrix<double>& coefficients);
   /// The coordinates of the cube have moved rigidly.
   void change_coordinates(const Mat4& motion);
-  /// Takes the obstacles a share of the way from where resume() had them.
-  void move_obstacles(double share);
+  /// Takes the obstacles a share of the way from where resume() had them. `ahead`: the surface will follow.
+  void move_obstacles(double share, bool ahead = false);
   /// The longest way left for a place of an obstacle's cube, in cube units.
   double obstacle_way() const;
 
   /// Follows the surface, and finds the planes near it. Returns how deep a place is beyond a margin.
-  /// `further`: how much farther than usual, in cube units, what is near lies; none: as far as the surface
-  /// has moved since the last search. `jumped`: the way here is not known, so that what the surface came
-  /// through of itself is told by facing normals.
+  /// `further`: what is near lies so much farther than usual, in cube units; none: as far as the surface has
+  /// moved since the last search. `jumped`: by an unknown way; facing normals tell what it came through.
   double find(const RowMatrix<double>& coefficients, std::optional<double> further = 0.0,
               bool jumped = false);
   ContactWays ways() const;
@@ -113,6 +112,7 @@ class ContactTerms {
   double deepest_outside_ = 0.0;
   double further_ = 0.0;
   bool touches_itself_ = false;
+  bool ahead_ = false;  // obstacles are, of the surface
   bool grips_ = false;  // what was found last
   bool known_ = false;  // nothing but the coefficients has changed since
 };

@@ -113,12 +113,13 @@ void ContactTerms::change_coordinates(const Mat4& motion) {
   places_ = affine_image(places_, motion);
 }
 
-void ContactTerms::move_obstacles(double share) {
+void ContactTerms::move_obstacles(double share, bool ahead) {
   for (Index k = 0; k < std::ssize(starts_); ++k) {
     const auto which = static_cast<std::size_t>(k);
     carried_[which].setIdentity();
     if (surfaces_[which].placement() == ends_[which]) continue;
     known_ = false;
+    ahead_ = ahead;
     const Mat4 before = surfaces_[which].placement();
     if (share < 1.0)
       surfaces_[which].place_between(starts_[which], ends_[which], share);
