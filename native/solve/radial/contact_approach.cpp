@@ -16,7 +16,7 @@ namespace {
 
 /// How far an obstacle moves in a step, in cube units.
 constexpr double obstacle_step = 0.02;
-/// Quasi-Newton steps between two searches for planes, and what a search counts for at least.
+/// Quasi-Newton steps between two searches for planes, and the fewest that a round counts for.
 constexpr Index steps_between = 6, least_at_once = 2;
 /// Solves of so many iterations whose handles or obstacles come from far go on to their end, where rounding
 /// changes less: so many quasi-Newton steps each time, until a round moves no sample

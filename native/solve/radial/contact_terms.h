@@ -36,7 +36,7 @@ class ContactTerms {
   void resume(const ContactState& state, const RowMatrix<double>& coefficients);
   /// The coordinates of the cube have moved rigidly.
   void change_coordinates(const Mat4& motion);
-  /// Takes the obstacles a share of the way from where resume() had them. `ahead`: the surface will follow.
+  /// Takes the obstacles a share of the way from where resume() had them. `ahead`: the surface follows later.
   void move_obstacles(double share, bool ahead = false);
   /// The longest way left for a place of an obstacle's cube, in cube units.
   double obstacle_way() const;
@@ -112,7 +112,7 @@ class ContactTerms {
   double deepest_outside_ = 0.0;
   double further_ = 0.0;
   bool touches_itself_ = false;
-  bool ahead_ = false;  // obstacles are, of the surface
+  bool ahead_ = false;  // obstacles have moved, and the surface follows later
   bool grips_ = false;  // what was found last
   bool known_ = false;  // nothing but the coefficients has changed since
 };
