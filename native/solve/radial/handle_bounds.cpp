@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
 
 #include "fields/radial_evaluator.h"
 #include "sampling/oriented_points.h"
@@ -169,18 +170,28 @@ void HandleBounds::bind_to_itself(const ContactPlane& plane, const Vec3& normal,
   bounds_of(second.holder).push_back({-normal, (1.0 - own) * depth, plane.obstacle});
 }
 
-/// By the method of Hildreth (1957).
+/// By the method of Hildreth (1957): sweeps over all bounds, and between these over the ones that push, until
+/// they rest.
 std::pair<Vec3, Index> HandleBounds::within(const std::vector<Bound>& bounds) {
   Vec3 way = Vec3::Zero();
   std::vector<double> pushes(bounds.size(), 0.0);
+  const auto change_by = [&](std::size_t k) {
+    const double next = std::max(0.0, pushes[k] + bounds[k].depth - bounds[k].normal.dot(way));
+    const double change = next - std::exchange(pushes[k], next);
+    if (change != 0.0) way += change * bounds[k].normal;
+    return std::abs(change);
+  };
+  std::vector<std::size_t> pushing;
   double change = settled;
   for (int sweep = 0; sweep < most_sweeps && change >= settled; ++sweep) {
     change = 0.0;
-    for (std::size_t k = 0; k < bounds.size(); ++k) {
-      const double next = std::max(0.0, pushes[k] + bounds[k].depth - bounds[k].normal.dot(way));
-      way += (next - pushes[k]) * bounds[k].normal;
-      change = std::max(change, std::abs(next - pushes[k]));
-      pushes[k] = next;
+    for (std::size_t k = 0; k < bounds.size(); ++k) change = std::max(change, change_by(k));
+    pushing.clear();
+    for (std::size_t k = 0; k < bounds.size(); ++k)
+      if (pushes[k] > 0.0) pushing.push_back(k);
+    for (double inner = change; sweep < most_sweeps && inner >= settled; ++sweep) {
+      inner = 0.0;
+      for (const std::size_t k : pushing) inner = std::max(inner, change_by(k));
     }
   }
   const auto most = std::max_element(pushes.begin(), pushes.end());
