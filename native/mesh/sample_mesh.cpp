@@ -11,6 +11,7 @@
 #include "core/errors.h"
 #include "core/memory.h"
 #include "core/parallel.h"
+#include "core/point_grid.h"
 
 namespace arapfields {
 namespace {
@@ -18,6 +19,10 @@ namespace {
 constexpr Index grain = 4096;
 /// Beyond it a sample would drown all others in rounding.
 constexpr double most_weight = 1e9;
+/// How far from the samples a mesh has nothing, in their spacings: chance leaves no such gaps.
+constexpr double widest_gap = 3.0;
+/// One sample of so many, at most, goes to what the others miss.
+constexpr Index least_share = 8;
 
 Vec3 corner(const Points& vertices, const Triangles& triangles, Index t, int k) {
   return vertices.row(triangles(t, k)).transpose();
@@ -45,7 +50,8 @@ Vector at_draws(const Vector& painted, const Triangles& triangles,
   return result;
 }
 
-SurfaceSamples draw_from(Joined joined, Index count, std::uint64_t seed) {
+/// `whole`: the last ones lie on what all others miss.
+SurfaceSamples draw_from(Joined joined, Index count, std::uint64_t seed, bool whole) {
   require(count > 0, "count", std::to_string(count), "at least 1 is needed");
   require_memory("count", 20.0 * sizeof(double) * static_cast<double>(count));
   SurfaceSamples samples;
@@ -65,6 +71,17 @@ SurfaceSamples draw_from(Joined joined, Index count, std::uint64_t seed) {
       if (!draws.empty()) draws[i] = draw;
     }
   });
+  std::vector<AreaSampler::Draw> missed;
+  if (whole)
+    missed =
+        sampler.missed(samples.points, widest_gap * std::sqrt(sampler.area() / static_cast<double>(count)),
+                       count / least_share);
+  for (Index i = count - std::ssize(missed); i < count; ++i) {
+    const AreaSampler::Draw draw = missed[static_cast<std::size_t>(count - 1 - i)];
+    samples.points.row(i) = draw.point.transpose();
+    samples.normals.row(i) = sampler.unit_normal(draw.triangle).transpose();
+    if (!draws.empty()) draws[i] = draw;
+  }
   samples.weights = at_draws(joined.painted.weights, joined.mesh.triangles, draws);
   samples.bend_weights = at_draws(joined.painted.bend_weights, joined.mesh.triangles, draws);
   for (Index i = 0; i < count && several; ++i) {
@@ -73,7 +90,7 @@ SurfaceSamples draw_from(Joined joined, Index count, std::uint64_t seed) {
   }
   const auto kept = std::make_shared<const Joined>(std::move(joined));
   samples.mesh = {kept, &kept->mesh};
-  samples.redraw = [kept](Index again, std::uint64_t other) { return draw_from(*kept, again, other); };
+  samples.redraw = [kept](Index again, std::uint64_t other) { return draw_from(*kept, again, other, false); };
   return samples;
 }
 
@@ -113,6 +130,33 @@ Vec3 AreaSampler::unit_normal(Index triangle) const {
   return (corner(vertices_, triangles_, triangle, 1) - a)
       .cross(corner(vertices_, triangles_, triangle, 2) - a)
       .stableNormalized();
+}
+
+std::vector<AreaSampler::Draw> AreaSampler::missed(PointsIn points, double reach, Index most) const {
+  Points all(points.rows() + vertices_.rows(), 3);
+  all << points, vertices_;
+  const PointGrid grid(all, reach);
+  const std::vector<Index> cells = grid.cell_of_each();
+  std::vector<bool> covered(static_cast<std::size_t>(grid.size()));
+  for (Index cell = 0; cell < grid.size(); ++cell)
+    covered[static_cast<std::size_t>(cell)] = grid.rows(cell).front() < points.rows();  // rows ascend
+  const auto is_near = [&](Index row) {
+    bool near = false;
+    grid.near(cells[static_cast<std::size_t>(row)], [&](Index cell) {
+      for (const Index i : grid.rows(cell))
+        near = near || (i < points.rows() && (all.row(i) - all.row(row)).squaredNorm() < reach * reach);
+    });
+    return near;
+  };
+  std::vector<Draw> found;
+  for (Index t = 0; t < triangles_.rows(); ++t)
+    for (int k = 0; k < 3 && std::ssize(found) < most; ++k) {
+      const Index row = points.rows() + triangles_(t, k), cell = cells[static_cast<std::size_t>(row)];
+      if (covered[static_cast<std::size_t>(cell)] || is_near(row) || unit_normal(t).isZero()) continue;
+      found.push_back({corner(vertices_, triangles_, t, k), t, Vec3::Unit(k)});
+      grid.near(cell, [&](Index other) { covered[static_cast<std::size_t>(other)] = true; });
+    }
+  return found;
 }
 
 Frame area_frame(PointsIn vertices, TrianglesIn triangles) {
@@ -166,7 +210,7 @@ SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count
                            const VertexWeights& painted) {
   require_weights("weights", painted.weights, vertices.rows());
   require_weights("bend_weights", painted.bend_weights, vertices.rows());
-  return draw_from({{vertices, triangles}, painted, area_frame(vertices, triangles), {}}, count, seed);
+  return draw_from({{vertices, triangles}, painted, area_frame(vertices, triangles), {}}, count, seed, true);
 }
 
 SurfaceSamples sample_meshes(const std::vector<TriangleMesh>& meshes, Index count, std::uint64_t seed,
@@ -211,7 +255,7 @@ SurfaceSamples sample_meshes(const std::vector<TriangleMesh>& meshes, Index coun
     v += mesh.vertices.rows();
     t += mesh.triangles.rows();
   }
-  return draw_from(std::move(all), count, seed);
+  return draw_from(std::move(all), count, seed, true);
 }
 
 }  // namespace arapfields

@@ -24,6 +24,10 @@ class ARAPFIELDS_EXPORT AreaSampler {
   };
   Draw draw(Random& random) const;
   Vec3 unit_normal(Index triangle) const;
+  double area() const { return cumulative_.back(); }
+  /// Corners of triangles, `most` at most, that lie farther than `reach` from all of these points (n,3), and
+  /// about as far from each other.
+  std::vector<Draw> missed(PointsIn points, double reach, Index most) const;
 
  private:
   Points vertices_;
@@ -46,8 +50,9 @@ struct VertexWeights {
 };
 
 /// `count` independent points, uniform by area, with their triangles' unit normals, in cube coordinates of
-/// area_frame(). Sample i depends on the seed and i alone. Throws InvalidInput as AreaSampler does, and for
-/// weights of another number, negative or not finite.
+/// area_frame(). Sample i depends on the seed and i alone, but where all miss small things that are far from
+/// the rest: the last ones lie on these. Throws InvalidInput as AreaSampler does, and for weights of another
+/// number, negative or not finite.
 ARAPFIELDS_EXPORT SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count,
                                              std::uint64_t seed, const VertexWeights& painted = {});
 

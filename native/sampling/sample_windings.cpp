@@ -3,7 +3,7 @@
 
 #include <numbers>
 
-#include "sampling/point_grid.h"
+#include "core/point_grid.h"
 
 namespace arapfields {
 

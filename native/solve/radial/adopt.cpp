@@ -14,30 +14,28 @@ double dot(const RowMatrix<double>& a, const RowMatrix<double>& b) { return a.cw
 
 /// What an objective of single precision would measure of a field, which may have another frame: the plane of
 /// reflections may have moved it.
-VectorF measured(const RadialState& s, const DeformationField& field) {
+VectorF measured(RadialState& s, const DeformationField& field) {
   const Frame &from = field.frame(), &own = s.problem.frame();
-  const auto to_field = [&](PointsIn points) {
-    return from == own ? Points(points) : from.to_cube(own.to_mesh(points));
-  };
-  const auto from_field = [&](PointsIn points) {
-    return from == own ? Points(points) : own.to_cube(from.to_mesh(points));
+  const auto jets_at = [&](const Points& points, JetOrder order) {
+    RowMatrix<double> jets(columns(order) * points.rows(), 3);
+    const JetView<double> view{jets.data(), points.rows(), order};
+    field.evaluate(from == own ? points : from.to_cube(own.to_mesh(points)), view);
+    if (from != own) jets.topRows(points.rows()) = own.to_cube(from.to_mesh(jets.topRows(points.rows())));
+    if (order == JetOrder::second) jets.bottomRows(6 * points.rows()) *= own.scale / from.scale;
+    return jets;
   };
   const Points& places = s.problem.energy_points;
-  JetBlock<double> jets(places.rows(), JetOrder::second);
-  field.evaluate(to_field(places), jets.view());
-  Eigen::Map<Points> values(jets.view().data, places.rows(), 3);
-  values = from_field(values);
-  Eigen::Map<Vector>(jets.view().column(4), 18 * places.rows()) *= own.scale / from.scale;
-  if (s.problem.blend) RadialBlend<double>(*s.problem.blend, places).multiply(jets.view());
-  const Points& sources = s.handles.pairs().sources;
-  Points ends(sources.rows(), 3);
-  field.evaluate(to_field(sources), {ends.data(), ends.rows(), JetOrder::value});
-  ends = from_field(ends);
-  VectorF u = VectorF::Zero(30 * places.rows() + 3 * ends.rows() + 3 * s.problem.basis.center_count());
-  u.head(30 * places.rows()) = Eigen::Map<const Vector>(jets.view().data, 30 * places.rows()).cast<float>();
-  u.segment(30 * places.rows(), 3 * ends.rows()) =
-      Eigen::Map<const Vector>(ends.data(), 3 * ends.rows()).cast<float>();
-  return u;
+  const PartLinks& links = s.handles.links();
+  RowMatrix<double> jets = jets_at(places, JetOrder::second);
+  if (s.problem.blend)
+    RadialBlend<double>(*s.problem.blend, places).multiply({jets.data(), places.rows(), JetOrder::second});
+  const RowMatrix<double> ends = jets_at(s.handles.pairs().sources, JetOrder::value);
+  const RowMatrix<double> apart =
+      links.values(jets_at(links.from(), JetOrder::first), jets_at(links.to(), JetOrder::first));
+  RowMatrix<float> u(jets.rows() + ends.rows() + apart.rows() + s.problem.basis.center_count(), 3);
+  u << jets.cast<float>(), ends.cast<float>(), apart.cast<float>(),
+      RowMatrix<float>::Zero(s.problem.basis.center_count(), 3);
+  return u.reshaped<Eigen::RowMajor>();
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "sampling/point_grid.h"
+#include "core/point_grid.h"
 #include "sampling/sample_choice.h"
 #include "solve/radial/contact_ways.h"
 

@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
+#include "core/point_grid.h"
 #include "fields/radial_evaluator.h"
-#include "sampling/point_grid.h"
 #include "solve/radial/block_ways.h"
 #include "solve/radial/problem.h"
 

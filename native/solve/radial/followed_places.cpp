@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/point_grid.h"
 #include "core/random.h"
 #include "core/unit_rows.h"
 #include "sampling/oriented_points.h"
-#include "sampling/point_grid.h"
 #include "sampling/sample_choice.h"
 #include "sampling/standing_out.h"
 

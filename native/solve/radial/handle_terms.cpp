@@ -168,4 +168,8 @@ const RowMatrix<double>& HandleTerms::basis_values() {
                            [&] { return radial_rows(problem_.basis, pairs_.sources, JetOrder::value); });
 }
 
+const PartLinks& HandleTerms::links() {
+  return links_.get({revision_}, [&] { return PartLinks(problem_, pairs_.sources); });
+}
+
 }  // namespace arapfields

@@ -6,7 +6,7 @@
 
 #include "energies/handles.h"
 #include "fields/influence.h"
-#include "solve/radial/problem.h"
+#include "solve/radial/part_links.h"
 
 namespace arapfields {
 
@@ -35,6 +35,8 @@ class HandleTerms {
   const std::shared_ptr<const Influence>& influence() const { return influence_; }
   /// Values of the basis functions (pairs, size) at the pairs' sources.
   const RowMatrix<double>& basis_values();
+  /// Of parts of the surface that no pair is in.
+  const PartLinks& links();
   /// Of the pairs' sources and weights; targets move without it.
   Revision revision() const { return revision_; }
 
@@ -56,6 +58,7 @@ class HandleTerms {
   Points held_;                                 // samples beyond the influence, which are held in place
   HandleBatch<double> pairs_;
   Dependent<RowMatrix<double>, 1> basis_values_;
+  Dependent<PartLinks, 1> links_;
   Revision revision_ = 0;
 };
 

@@ -28,9 +28,10 @@ void RadialObjective<Scalar>::set_stiffness(const Vector& bending, const Vector&
 
 template <class Scalar>
 void RadialObjective<Scalar>::set_handles(const HandleBatch<double>& pairs,
-                                          const RowMatrix<double>& basis_values) {
+                                          const RowMatrix<double>& basis_values, const PartLinks& links) {
   pairs_ = {pairs.sources.cast<Scalar>(), pairs.targets.cast<Scalar>(), pairs.weights.cast<Scalar>()};
   handle_basis_ = TallMatrix<Scalar>(basis_values);
+  links_ = TallMatrix<Scalar>(links.rows());
 }
 
 template <class Scalar>
@@ -48,6 +49,13 @@ void RadialObjective<Scalar>::set_contact(const ContactSet& contact) {
                  ? RadialEvaluator<Scalar>()
                  : RadialEvaluator<Scalar>(problem_.basis, contact.places, JetOrder::value,
                                            contact.embedded.rows() > 0 ? &contact.embedded : nullptr);
+}
+
+template <class Scalar>
+PointsOf<Scalar> RadialObjective<Scalar>::sample_values_of(const RowMatrix<double>& c) const {
+  PointsOf<Scalar> values(samples_.size(), 3);
+  samples_.evaluate(c, {values.data(), samples_.size(), JetOrder::value});
+  return values;
 }
 
 template <class Scalar>
@@ -83,6 +91,8 @@ void RadialObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& 
   const PointsOf<Scalar> rounded = c.cast<Scalar>();
   Eigen::Map<PointsOf<Scalar>>(u.data() + handle_offset(), pairs_.sources.rows(), 3) =
       handle_basis_.times(rounded);
+  if (links_.rows() > 0)
+    Eigen::Map<PointsOf<Scalar>>(u.data() + link_offset(), links_.rows(), 3) = links_.times(rounded);
   u.segment(center_offset(), 3 * center_count()) =
       Eigen::Map<const Measurements>(rounded.data(), 3 * center_count());
   measure_contact(c, u);
@@ -148,19 +158,25 @@ Eigen::VectorX<Scalar> RadialObjective<Scalar>::weighted(const Measurements& u) 
   }
   Eigen::Map<PointsOf<Scalar>>(result.data() + handle_offset(), pairs, 3) =
       Scalar(2.0 * handle_weight()) * (pairs_.weights.asDiagonal() * handle_values(u));
+  const Index apart = center_offset() - link_offset();
+  result.segment(link_offset(), apart) = Scalar(2.0) * u.segment(link_offset(), apart);
   return result;
 }
 
 template <class Scalar>
 double RadialObjective<Scalar>::value(const Measurements& u, Measurements* cotangents) const {
   const RadialTerms terms = evaluate(u, cotangents);
+  const auto apart = u.segment(link_offset(), 3 * links_.rows());
   const auto centers = u.segment(center_offset(), 3 * center_count());
-  if (cotangents != nullptr)
-    cotangents->segment(center_offset(), 3 * center_count()) = Scalar(2.0 * coefficient_weight) * centers;
+  if (cotangents != nullptr) {
+    cotangents->segment(link_offset(), apart.size()) = Scalar(2.0) * apart;
+    cotangents->segment(center_offset(), centers.size()) = Scalar(2.0 * coefficient_weight) * centers;
+  }
   return terms.arap.energy + handle_weight() * terms.handles + (style_ ? style_->weight * terms.gauss : 0.0) +
          (stance_ ? stance_->weight * terms.stance : 0.0) + barrier() * terms.barrier +
          (body_ ? terms.body.sum() : 0.0) + terms.contact +
          std::accumulate(terms.external.begin(), terms.external.end(), 0.0) +
+         static_cast<double>(apart.squaredNorm()) +
          coefficient_weight * static_cast<double>(centers.squaredNorm());
 }
 
@@ -175,6 +191,10 @@ RowMatrix<double> RadialObjective<Scalar>::pull_back(const Measurements& cotange
     samples_.pull_back({own.data(), samples_.size(), JetOrder::second}, gradient);
   }
   gradient += handle_basis_.transpose_times(handle_values(cotangents)).template cast<double>();
+  if (links_.rows() > 0) {
+    const Eigen::Map<const PointsOf<Scalar>> apart(cotangents.data() + link_offset(), links_.rows(), 3);
+    gradient += links_.transpose_times(apart).template cast<double>();
+  }
   Eigen::Map<Vector>(gradient.data(), 3 * center_count()) +=
       cotangents.segment(center_offset(), 3 * center_count()).template cast<double>();
   if (contact_.size() > 0)

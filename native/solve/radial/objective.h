@@ -11,14 +11,14 @@
 #include "solve/radial/blend.h"
 #include "solve/radial/contact_stiffness.h"
 #include "solve/radial/hooks.h"
-#include "solve/radial/problem.h"
+#include "solve/radial/part_links.h"
 #include "solve/radial/terms.h"
 
 namespace arapfields {
 
-/// mean (stretch + λ·bend) + weight·handles + λ_Gauss·gauss + stance + barrier + body + contact + external +
-/// a vanishing pull of all centers towards zero, of the fields of one radial basis. Measurements: jets at the
-/// energy samples, values at the handles' sources, centers, values at the places of the contact. In single
+/// mean (stretch + λ·bend) + weight·handles + links + λ_Gauss·gauss + stance + barrier + body + contact +
+/// external + a vanishing pull of all centers towards zero, of the fields of one radial basis. Measurements:
+/// jets at the energy samples, values at the handles' sources, links, centers, values in contact. In single
 /// precision a step costs half, and the value is good to some 1e-6 of itself.
 template <class Scalar>
 class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
@@ -29,8 +29,9 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   explicit RadialObjective(const RadialProblem& problem);
   /// λ of each sample (n), and its factor on its energy (n; empty: all 1).
   void set_stiffness(const Vector& bending, const Vector& weights);
-  /// Pairs that pull, and the values of the basis functions at their sources.
-  void set_handles(const HandleBatch<double>& pairs, const RowMatrix<double>& basis_values);
+  /// Pairs that pull, the values of the basis functions at their sources, and links of parts without any.
+  void set_handles(const HandleBatch<double>& pairs, const RowMatrix<double>& basis_values,
+                   const PartLinks& links);
   void set_targets(PointsIn targets);
   /// L⁻¹ of the preconditioner's matrix L Lᵀ; borrowed.
   void set_preconditioner(const TallMatrix<float>& inverse_factor) { inverse_factor_ = &inverse_factor; }
@@ -62,11 +63,7 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
     });
   }
   /// Where the field with these coefficients takes them; without a blend.
-  PointsOf<Scalar> sample_values_of(const RowMatrix<double>& c) const {
-    PointsOf<Scalar> values(samples_.size(), 3);
-    samples_.evaluate(c, {values.data(), samples_.size(), JetOrder::value});
-    return values;
-  }
+  PointsOf<Scalar> sample_values_of(const RowMatrix<double>& c) const;
   /// Where the pairs' sources are.
   Eigen::Map<const PointsOf<Scalar>> handle_values(const Measurements& u) const {
     return {u.data() + handle_offset(), pairs_.sources.rows(), 3};
@@ -92,7 +89,8 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   RadialTerms evaluate(JetView<const Scalar> jets, const Measurements& u, Scalar* cotangents) const;
   Index center_count() const { return samples_.center_count(); }
   Index handle_offset() const { return 30 * samples_.size(); }
-  Index center_offset() const { return handle_offset() + 3 * pairs_.sources.rows(); }
+  Index link_offset() const { return handle_offset() + 3 * pairs_.sources.rows(); }
+  Index center_offset() const { return link_offset() + 3 * links_.rows(); }
   Index contact_offset() const { return center_offset() + 3 * center_count(); }
   double handle_weight() const { return problem_.options.handle_weight; }
   double barrier() const {
@@ -107,6 +105,7 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   Eigen::VectorX<Scalar> weights_;  // may be empty
   HandleBatch<Scalar> pairs_;
   TallMatrix<Scalar> handle_basis_;  // (pairs, size)
+  TallMatrix<Scalar> links_;         // (rows, size)
   const TallMatrix<float>* inverse_factor_ = nullptr;
   std::optional<StyleTerm<Scalar>> style_;
   std::optional<StanceTerm<Scalar>> stance_;

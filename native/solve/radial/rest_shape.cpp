@@ -28,7 +28,9 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
   thickness = std::make_shared<const LocalThickness>(samples.points, samples.normals, order);
   progress.check();
   Random random(seed, stream);
-  const std::vector<Index> chosen = stratified(order, most_sites, random);
+  std::vector<Index> chosen = stratified(order, most_sites, random);
+  const std::vector<Index> missed = missed_rows(samples.points, chosen);
+  chosen.insert(chosen.end(), missed.begin(), missed.end());
   sites = rows_of(samples.points, chosen);
   const Vector thick = thickness->at(sites);
   layout.sizes = (thick / thickness->median()).cwiseMax(least_size).cwiseSqrt();
@@ -43,6 +45,7 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
     normals = std::move(half.normals);
     layout = std::move(half.layout);
   }
+  parts = parts_of(sites);
   if (!interior || normals.rows() == 0) return;
   progress.check();
   const MayJoin sites_may_join = [&](Index i, Index j) { return may_join(chosen[i], chosen[j]); };

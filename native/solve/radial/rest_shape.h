@@ -10,6 +10,7 @@
 #include "mesh/surface_samples.h"
 #include "options/choices.h"
 #include "sampling/local_thickness.h"
+#include "sampling/parts.h"
 #include "solve/radial/followed_places.h"
 
 namespace arapfields {
@@ -29,8 +30,9 @@ struct RestShape {
 
   std::vector<std::uint32_t> order;  ///< the samples, neighbours beside each other
   std::shared_ptr<const LocalThickness> thickness;
-  Points sites;         ///< (n,3) samples that centers are chosen from; folded where there is an axis
-  RadialLayout layout;  ///< how dense centers stand there, and what is below
+  Points sites;              ///< (n,3) samples that centers are chosen from; folded where there is an axis
+  RadialLayout layout;       ///< how dense centers stand there, and what is below
+  std::vector<Index> parts;  ///< parts_of() the sites
   std::shared_ptr<const InteriorEmbedding> embedding;  ///< null where straight distances serve
 
  private:

@@ -7,10 +7,10 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
+#include "core/point_grid.h"
 #include "core/unit_rows.h"
 #include "fields/radial_evaluator.h"
 #include "sampling/oriented_points.h"
-#include "sampling/point_grid.h"
 #include "sampling/sample_choice.h"
 
 namespace arapfields {

@@ -54,6 +54,8 @@ TallMatrix<float> RadialState::factor(double inertia) {
     values.bottomRows(rows.rows()) = rows;
     weights.tail(rows.rows()) = shares;
   };
+  if (const RowMatrix<double>& rows = handles.links().rows(); rows.rows() > 0)
+    add(rows, Vector::Ones(rows.rows()));
   if (const auto& stance = style.stance(handles.any())) {
     auto [rows, shares] = stance_rows(problem.basis, stance->rest, stance->stance);
     add(std::move(rows), stance->weight * shares);
@@ -70,7 +72,8 @@ RadialObjective<Scalar>& RadialState::objective(RadialPrecision<Scalar>& precisi
     precision.handles = precision.contact = 0;
     return std::make_unique<RadialObjective<Scalar>>(problem);
   });
-  if (precision.handles != handles.revision()) result.set_handles(handles.pairs(), handles.basis_values());
+  if (precision.handles != handles.revision())
+    result.set_handles(handles.pairs(), handles.basis_values(), handles.links());
   precision.handles = handles.revision();
   const auto cast = [](const auto& term) {
     return term ? std::optional(term->template cast<Scalar>()) : std::nullopt;

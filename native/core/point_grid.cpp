@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sampling/point_grid.h"
+#include "core/point_grid.h"
 
 #include <algorithm>
 

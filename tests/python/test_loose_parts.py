@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parts of a mesh that nothing joins and no handle holds stay beside what they lie next to."""
+
+import numpy as np
+import pytest
+from support.geometry import meshes
+from support.geometry.cases import shift
+
+import arapfields as af
+
+NORTH, PULLED = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.5])
+OTHERS = np.array([[0.0, 0, -1], [1, 0, 0], [-1, 0, 0], [0, 1, 0]])
+# Of a speck's distance: how far it may be from where the ball's nearest place would take it, turned and
+# stretched as that is. The map bends on the way, and a speck's own shape is kept.
+BESIDE = 0.15
+STEP = 1e-4  # of differences
+
+
+def ball_with_specks(radius, gap, count=6, seed=3):
+    """(vertices, triangles, directions of the specks), whose nearest places are those of the unit ball."""
+    directions = np.random.default_rng(seed).normal(size=(count, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    ball, speck = meshes.sphere(1.0, 4), meshes.sphere(radius, 1)
+    vertices = [ball[0], *(speck[0] + (1 + gap + radius) * d for d in directions)]
+    triangles = [ball[1], *(speck[1] + len(ball[0]) + i * len(speck[0]) for i in range(count))]
+    return np.concatenate(vertices), np.concatenate(triangles), directions
+
+
+def handles():
+    return [af.Point(NORTH, PULLED), *(af.Point(place, place) for place in OTHERS)]
+
+
+def away(field, vertices, direction):
+    """How far a speck's vertices are from where the field at the ball's nearest place would take them."""
+    steps = STEP * np.eye(3)
+    slope = (field(direction + steps) - field(direction - steps)).T / (2 * STEP)
+    expected = field(direction[None]) + (vertices - direction) @ slope.T
+    return np.linalg.norm(field(vertices) - expected, axis=1).max()
+
+
+def farthest(field, vertices, directions):
+    specks = vertices[len(meshes.sphere(1.0, 4)[0]) :].reshape(len(directions), -1, 3)
+    return max(
+        away(field, speck, d) / np.linalg.norm(speck.mean(0) - d)
+        for speck, d in zip(specks, directions, strict=True)
+    )
+
+
+@pytest.mark.parametrize("gap", [0.2, 0.5, 1.5])
+@pytest.mark.parametrize("radius", [0.005, 0.02, 0.15])
+def test_specks_go_where_the_nearest_place_takes_them(radius, gap):
+    vertices, triangles, directions = ball_with_specks(radius, gap)
+    samples = af.sample_mesh(vertices, triangles, count=6000, seed=1)
+    live = af.LiveDeformer(samples, handles())
+    for _ in range(10):
+        field = live.solve([handle.target for handle in handles()])
+    assert farthest(field, vertices, directions) < BESIDE
+    assert farthest(af.deform(samples, handles()), vertices, directions) < BESIDE
+
+
+@pytest.mark.parametrize("changes", [{"symmetry": "x"}, {"exact_handles": True}], ids=str)
+def test_with_a_symmetry_and_with_exact_handles_too(changes):
+    vertices, triangles, directions = ball_with_specks(0.02, 0.5)
+    samples = af.sample_mesh(vertices, triangles, count=6000, seed=1)
+    field = af.deform(samples, handles(), af.DeformOptions(**changes))
+    assert farthest(field, vertices, directions) < BESIDE
+
+
+def test_a_chain_of_parts_follows_its_first():
+    """Each lies next to the one before; one that is held apart stays where it is, and takes none along."""
+    ball = meshes.sphere(0.4, 3)
+    centers = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 3, 0], [0, 4, 0]])
+    vertices = np.concatenate([ball[0] + center for center in centers])
+    triangles = np.concatenate([ball[1] + i * len(ball[0]) for i in range(5)])
+    box, held = np.diag([0.45, 0.45, 0.45, 1.0]), shift([0, 3, 0]) @ np.diag([0.45, 0.45, 0.45, 1.0])
+    turn = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0.3], [0, 0, 1, 0], [0, 0, 0, 1]])
+    samples = af.sample_mesh(vertices, triangles, count=8000, seed=2)
+    field = af.deform(samples, [af.Cuboid(box, turn @ box), af.Cuboid(held, held)])
+    moved = field(vertices).reshape(5, -1, 3)
+    rest = vertices.reshape(5, -1, 3)
+    for part in range(3):
+        assert np.abs(moved[part] - rest[part] @ turn[:3, :3].T - turn[:3, 3]).max() < 0.05
+    assert np.abs(moved[3:] - rest[3:]).max() < 0.01
+
+
+def test_parts_that_handles_hold_do_not_feel_each_other():
+    ball = meshes.sphere(1.0, 4)
+    other = np.array([2.5, 0.0, 0.0])
+    way = np.array([1.0, 0.0, 1.0])
+    vertices = np.concatenate([ball[0], ball[0] + other])
+    samples = af.sample_mesh(vertices, np.concatenate([ball[1], ball[1] + len(ball[0])]), 6000, seed=1)
+    places = np.concatenate([OTHERS, [NORTH]])
+    pins = [af.Point(place, place) for place in places]
+    pins += [af.Point(place + other, place + other + way) for place in places * [-1, 1, 1]]
+    moved = af.deform(samples, pins)(vertices)
+    left_alone = 1e-3  # 4e-4 by the pull of the other's centers, with links or without
+    assert np.abs(moved[: len(ball[0])] - ball[0]).max() < left_alone
+    assert np.abs(moved[len(ball[0]) :] - ball[0] - other - way).max() < left_alone
+
+
+def test_each_small_thing_far_from_the_rest_has_a_sample():
+    vertices, triangles, _ = ball_with_specks(1e-4, 0.5)
+    ball = meshes.sphere(1.0, 4)
+    samples = af.sample_mesh(vertices, triangles, count=2000, seed=1)
+    distance = np.linalg.norm(vertices[len(ball[0]) :, None] - samples.points, axis=2)
+    assert distance.reshape(6, -1).min(axis=1).max() < 1e-4
+    assert len(samples.points) == 2000
+    # The others are drawn as ever, and where there is nothing small, all are.
+    few, many = (af.sample_mesh(*ball, count=count, seed=1).points for count in (1000, 2000))
+    assert np.array_equal(few, many[:1000])
+
+
+def test_many_small_things_take_a_share_of_the_samples_alone():
+    rng = np.random.default_rng(0)
+    speck, ball = meshes.sphere(1e-4, 0), meshes.sphere(1.0, 3)
+    specks = rng.uniform(-20, 20, (3000, 1, 3)) + speck[0]
+    vertices = np.concatenate([ball[0], specks.reshape(-1, 3)])
+    triangles = np.concatenate(
+        [ball[1], (speck[1] + len(ball[0]) + len(speck[0]) * np.arange(3000)[:, None, None]).reshape(-1, 3)]
+    )
+    samples = af.sample_mesh(vertices, triangles, count=1600, seed=1)
+    on_ball = np.linalg.norm(samples.points, axis=1) < 1.01
+    assert on_ball.sum() >= 1600 * 7 / 8 - 1
