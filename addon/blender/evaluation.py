@@ -62,3 +62,8 @@ def is_driven(item):
     """Whether keys, drivers or constraints may move an object."""
     data = item.animation_data
     return bool(item.constraints or (data and (data.action or data.drivers or data.nla_tracks)))
+
+
+def is_animated(item):
+    """Whether keys, drivers or constraints may move an object, or what it is a child of."""
+    return is_driven(item) or (item.parent is not None and is_animated(item.parent))

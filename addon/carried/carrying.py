@@ -9,7 +9,7 @@ from ..blender import mesh_arrays, modifier_stack
 from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError, refuse
-from ..core.geometry.spaces import transform
+from ..core.geometry.spaces import transform, unflattened
 from ..field_modifier import masks, motion
 from ..field_nodes import helper
 from . import refusals
@@ -69,7 +69,8 @@ class Carrying:
             except UserError as error:
                 self.leave(carried, error)
                 continue
-            matrices = (space.world_to_solve @ matrix for matrix in (world.rest, world.now, world.parent))
+            matrices = map(unflattened, (world.rest, world.now, world.parent))
+            matrices = (space.world_to_solve @ matrix for matrix in matrices)
             poses.append(CarriedPose(carried, carried.carrier.points, *matrices))
         if self.nodes is not None:
             poses.append(CarriedPose(self.nodes, None, space.local_to_solve, np.eye(4), np.eye(4)))

@@ -9,7 +9,7 @@ from mathutils import Euler, Matrix, Quaternion, Vector
 from ..blender.actions import remove_curves
 from ..core.errors import UserError
 from ..core.geometry import posing
-from ..core.geometry.spaces import inverse, transform
+from ..core.geometry.spaces import inverse, transform, unflattened
 from ..field_modifier import motion
 from .carriers import Carrier
 from .world_matrices import array
@@ -85,7 +85,7 @@ class TransformCarrier(PoseCarrier):
 
     def write(self, item, entry, basis):
         base = self.own_state(item, entry)
-        turn = posing.turn_between(own_basis(item, base), basis)
+        turn = posing.turn_between(unflattened(own_basis(item, base)), basis)
         turn = Matrix(turn.tolist()) @ base_turn(item, base).to_matrix()
         motion.written.add(item.session_uid)
         item.delta_location = (basis[:3, 3] - array(item.location)).tolist()

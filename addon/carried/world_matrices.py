@@ -52,7 +52,8 @@ def parent_now(item, depsgraph, now, own):
     """What takes the object's own motion to the world."""
     if item.parent is None:
         return np.eye(4)
-    if not any(constraint.enabled for constraint in item.constraints):
+    is_flat = np.linalg.det(own[:3, :3]) == 0.0
+    if not is_flat and not any(constraint.enabled for constraint in item.constraints):
         return now @ np.linalg.inv(own)
     return parent_of(item, depsgraph, array(item.parent.evaluated_get(depsgraph).matrix_world), posed=True)
 

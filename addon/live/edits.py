@@ -8,8 +8,9 @@ import bpy
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
+from ..blender.evaluation import is_animated
 from ..blender.object_references import settings_of
-from ..core.geometry.spaces import space_of
+from ..core.geometry.spaces import SAME_STRETCH, space_of
 from ..field_modifier import motion
 from ..field_nodes import helper
 from ..handles import empties, movers
@@ -18,7 +19,6 @@ from ..solver import secondary_motion
 from ..solver.source_reader import SourceChanged, rest_frame, uses_handles
 from ..stiffness import painted
 
-SAME_STRETCH = 1e-6  # noise of a rotation in single precision
 STROKE = 0.3  # seconds without a touch of the brush after which a stroke has ended
 
 
@@ -72,7 +72,7 @@ class EditWatch:
 
     def require_unedited(self, context, source):
         """SourceChanged where the mesh is another than when it was read; else reads what has only moved."""
-        if source.animation_data is None and self.is_stretched(source):
+        if not is_animated(source) and self.is_stretched(source):
             raise SourceChanged(source.name)
         if self.may_be_edited and not self.is_in_stroke(source):
             self.may_be_edited = False
@@ -87,8 +87,8 @@ class EditWatch:
         """Whether it is scaled otherwise than when it was read, not evenly; once it rests, in any digit."""
         world = matrix_of(source)
         rests, self.world = np.array_equal(world, self.world), world
-        now, then = (one.local_to_solve for one in (space_of(world, source.name), self.reader.surface.space))
-        return not np.allclose(now, then, rtol=0.0, atol=0.0 if rests else SAME_STRETCH)
+        now = space_of(world, source.name)
+        return not now.is_like(self.reader.surface.space, 0.0 if rests else SAME_STRETCH)
 
     def is_in_stroke(self, source):
         return source.mode == "WEIGHT_PAINT" and time.monotonic() - self.edited_at < STROKE

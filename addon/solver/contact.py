@@ -169,8 +169,9 @@ def contact_of(source, settings, space, depsgraph):
         return None
     world = space.solve_to_world
     scale = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
-    height = (from_single_precision(group.ground) - world[2, 3]) / scale if group.use_ground else None
-    up = tuple((world[2, :3] / scale).tolist())
+    rise = float(np.linalg.norm(world[2, :3]))
+    height = (from_single_precision(group.ground) - world[2, 3]) / rise if group.use_ground else None
+    up = tuple((world[2, :3] / rise).tolist())
     found = [read(item, margin / scale, space, depsgraph) for item, margin in obstacles_of(source)]
     solids = tuple(solid for solid in found if solid is not None)
     if not solids and height is None and not group.itself:
@@ -201,12 +202,12 @@ def read(item, margin, space, depsgraph):
         seen.to_mesh_clear()
     world = np.asarray(seen.matrix_world, dtype=np.float64)
     vertices, triangles = arrays.vertices, arrays.triangles
+    to_solve = space.world_to_solve @ world
     try:
-        own = space_of(world, item.name)
-        vertices = transform(np.round(own.local_to_solve, DIGITS), vertices)
-        placement = space.world_to_solve @ own.solve_to_world
+        own = space_of(to_solve, item.name)
+        vertices, placement = transform(np.round(own.local_to_solve, DIGITS), vertices), own.solve_to_world
     except UserError:  # flat: a sheet
-        vertices, placement = transform(space.world_to_solve @ world, vertices), np.eye(4)
+        vertices, placement = transform(to_solve, vertices), np.eye(4)
         if np.ptp(vertices, axis=0).max() == 0.0:
             return None
     if np.linalg.det(placement[:3, :3]) < 0.0:

@@ -16,7 +16,7 @@ class SecondaryMotion(NamedTuple):
     options: tuple  # ((name, value) of the native options)
     up: tuple  # (3,) the world's
     ground: float | None  # height along `up`
-    world: tuple  # solve → world, a similarity, row by row
+    world: tuple  # solve → world, row by row
 
     def coordinates_since(self, earlier):
         """(4, 4) rigid: solve space then → solve space now, where the source has moved in the world."""
@@ -42,8 +42,9 @@ def motion_of(settings, space):
         from_single_precision(value) for value in (group.strength, group.damping, group.gravity, group.ground)
     )
     options = (("strength", strength), ("damping", damping), ("gravity", gravity / scale))
-    height = (ground - world[2, 3]) / scale if group.use_ground else None
-    up = tuple((world[2, :3] / scale).tolist())
+    rise = float(np.linalg.norm(world[2, :3]))
+    height = (ground - world[2, 3]) / rise if group.use_ground else None
+    up = tuple((world[2, :3] / rise).tolist())
     return SecondaryMotion(options, up, height, tuple(world.ravel().tolist()))
 
 

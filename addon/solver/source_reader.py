@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads a source and its handles for a solver, on the main thread: the setup once, then requests."""
 
+import functools
 from dataclasses import replace
 
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack, unkeyed, user_preferences, vertex_groups
-from ..blender.evaluation import depsgraph_of
+from ..blender.evaluation import depsgraph_of, is_animated
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.point_data import shape_keys_of
 from ..blender.property_definitions import from_single_precision
 from ..carried.carrying import Carrying, Reshaped
 from ..core.errors import UserError
-from ..core.geometry.spaces import space_of
+from ..core.geometry.spaces import space_of, unflattened
 from ..core.runtime import native
 from ..handles import empties, movers
 from ..handles.properties import UNKNOWN_FRAME
@@ -43,7 +44,10 @@ class SourceReader:
         context.view_layer.update()
         self.reference, self.kind = ObjectReference(source), kind
         self.carrying = Carrying(context, source)
-        self.surface, is_at_hand = read_at_rest(context, source, kind, in_place, carrying=self.carrying)
+        space = space_of(place_of(source), source.name)
+        self.surface, is_at_hand = read_at_rest(
+            context, source, kind, in_place, carrying=self.carrying, space=space
+        )
         self.moves_by_itself = in_place and has_motion_before(source, in_place)
         self.fingerprint = mesh_arrays.fingerprint(source.data)
         self.points = self.surface.local  # where the modifiers before have them now
@@ -83,7 +87,7 @@ class SourceReader:
         """The handles at rest; `weights` are those of the vertex groups, where any of them needs one."""
         for entry in empties.used(source):
             movers.follow_rename(entry)
-        handles = empties.solve_handles(source, self.surface.space, weights)
+        handles = empties.solve_handles(source, self.surface.space, weights, place_of)
         self.handles = [replace(handle, target=handle.rest) for handle in handles]
 
     def read_points(self, context, source):
@@ -102,14 +106,11 @@ class SourceReader:
     def request(self, context, rendered=None):
         """The Request of the present handles and settings; `rendered`: as a render's depsgraph has them."""
         source = seen = self.reference.get()
-        where = empties.matrix_of
         if rendered is not None:
             seen = source.evaluated_get(rendered)
-
-            def where(item, bone=""):
-                return empties.matrix_of(item.original.evaluated_get(rendered), bone)
-
+        where = functools.partial(place_of, rendered=rendered)
         settings, space, targets = settings_of(seen), space_of(where(source), source.name), []
+        space = space.as_at(self.surface.space)
         if self.handles:
             current = empties.solve_handles(source, space, where=where)
             if len(current) != len(self.handles):
@@ -126,6 +127,13 @@ class SourceReader:
             secondary_motion.motion_of(settings, space),
             contact_of(source, settings, space, rendered or depsgraph_of(context)),
         )
+
+
+def place_of(item, bone="", rendered=None):
+    """(4, 4) where an object is, or its posed bone, maybe as a render has it. What grows from nothing is flat
+    at some frames: it counts as of full scale there."""
+    matrix = empties.matrix_of(item if rendered is None else item.original.evaluated_get(rendered), bone)
+    return unflattened(matrix) if item.type != "EMPTY" and not bone and is_animated(item) else matrix
 
 
 def style_term(settings, space, where):

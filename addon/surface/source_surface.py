@@ -138,17 +138,18 @@ def in_world_shape(splats, space, source):
 
 
 def read_surface(
-    context, source, in_place=False, *, exact=None, fit_operator=None, carrying=None, frame=None
+    context, source, in_place=False, *, exact=None, fit_operator=None, carrying=None, frame=None, space=None
 ):
     """All of a source that the worker needs; UserError when it cannot be worked on. Main thread.
 
     `exact` and the arguments of `fit_operator` count before the object's settings. `carrying`
     (carried/carrying.py) is given for a solve: the samples are then as stiff as the source is painted, and
     spread over what is carried together with it. `frame`: another than that at hand, whose shape is read.
+    `space`: the solve space, where that is not what the object's matrix at hand says.
     """
     context.view_layer.update()
     mesh, settings = mesh_arrays.read(context, source, in_place, frame), settings_of(source)
-    space = space_of(world_matrix(source), source.name)
+    space = space or space_of(world_matrix(source), source.name)
     vertices, below = space.to_solve(mesh.vertices), modifier_stack.before(source, in_place)
     return SourceSurface(
         reference=ObjectReference(source),

@@ -102,8 +102,9 @@ def solve_handle(name, kind, rest_local, world, now_world, space, **further):
     if further.get("allow_scale"):
         motion = to_solve @ affine_motion(name, rest_world, now_world) @ space.solve_to_world
     else:
-        motion = to_solve @ rigid_motion(rest_world, now_world) @ space.solve_to_world
-        motion = rigid_motion(np.eye(4), motion)
+        mapped = to_solve @ rigid_motion(rest_world, now_world) @ space.solve_to_world
+        motion = rigid_motion(np.eye(4), mapped)
+        motion[:3, 3] += (mapped - motion)[:3] @ rest[:, 3]  # where the space is stretched, the middle is met
     extent = np.linalg.norm(rest[:3, :3], axis=0).max()
     moved = np.abs(motion[:3, :3] - np.eye(3)).max() > ANCHOR_TOLERANCE
     shift = motion[:3, :3] @ rest[:3, 3] + motion[:3, 3] - rest[:3, 3]

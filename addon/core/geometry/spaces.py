@@ -15,6 +15,7 @@ from .rotations import best_rotation
 
 UNIFORM_SCALE_TOLERANCE = 1e-5  # relative spread of the scales below which they count as equal
 FLAT_SCALE_TOLERANCE = 1e-6  # smallest scale, relative to the largest
+SAME_STRETCH = 1e-6  # noise of a rotation in single precision
 LEAST_MOVE = 1e-4  # of a shape's size: more than what two objects that move together change by rounding
 
 
@@ -48,6 +49,20 @@ class Space:
         flip = np.eye(4)
         flip[axis, axis] = -1.0
         return self.solve_to_world @ flip @ self.world_to_solve
+
+    def is_like(self, other, noise=SAME_STRETCH):
+        """Whether an object is stretched as in another space."""
+        return np.allclose(self.local_to_solve, other.local_to_solve, rtol=0.0, atol=noise)
+
+    def as_at(self, first):
+        """The space of an object that is stretched otherwise than at first, with local → solve as at first.
+
+        Its shape is then solved as at first, and stretched as a whole: solve → world is no similarity.
+        """
+        if self.is_like(first):
+            return self
+        to_world = self.solve_to_world @ self.local_to_solve @ inverse(first.local_to_solve)
+        return Space(first.local_to_solve, to_world)
 
     @property
     def world_to_solve(self):
@@ -98,6 +113,22 @@ def space_of(matrix_world, name="object"):
     solve_to_world[:3, :3] = scale * (left @ right)
     solve_to_world[:3, 3] = world[:3, 3]
     return Space(local_to_solve, solve_to_world)
+
+
+def unflattened(matrix):
+    """The same matrix; where its scale flattens it, axes that are lost get the scale of the longest, or 1.
+
+    For frames at which something grows from nothing, or vanishes: no shape is seen there, and any will do.
+    """
+    left, scales, right = np.linalg.svd(matrix[:3, :3])
+    lost = scales <= FLAT_SCALE_TOLERANCE * scales[0]
+    if not lost.any():
+        return matrix
+    scales[lost] = scales[0] or 1.0
+    scales[-1] *= np.sign(np.linalg.det(left @ right))
+    result = matrix.copy()
+    result[:3, :3] = left @ np.diag(scales) @ right
+    return result
 
 
 def pose(matrix):
