@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that work on the panel's source and say before they are pressed why they would refuse."""
 
+import numpy as np
+
 from ..core.errors import UserError
+from ..core.geometry.spaces import space_of
+from .evaluation import world_matrix
 from .guide import Guided
 from .language import translated
 from .object_references import refusal, refusal_of_linked, source_of
@@ -15,8 +19,11 @@ class ReportingOperator(Guided):
 
     def execute(self, context):
         context.view_layer.update()
+        source = source_of(context)
         try:
-            line = self.change(context, source_of(context))
+            line = self.change(context, source)
+        except np.linalg.LinAlgError as error:
+            return self.refuse(flat(source) or error)
         except (UserError, ValueError, OSError) as error:
             return self.refuse(error)
         if line:
@@ -30,6 +37,16 @@ class ReportingOperator(Guided):
     def refuse(self, error):
         self.report({"ERROR"}, translated(error))
         return {"CANCELLED"}
+
+
+def flat(source):
+    """The UserError of a source whose scale flattens it; None where that is not so, or there is none."""
+    try:
+        if source is not None:
+            space_of(world_matrix(source), source.name)
+    except UserError as error:
+        return error
+    return None
 
 
 class SourceOperator(ReportingOperator):

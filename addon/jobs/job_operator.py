@@ -146,7 +146,7 @@ class JobOperator(ModalRun, Guided):
             if isinstance(text, types.GeneratorType):
                 text = yield from text
             self.successes.append(f"{outcome.item.label}: {text}, {outcome.seconds:.1f} s")
-        except UserError as error:
+        except (UserError, ValueError) as error:
             self.failures.append(translated(error))
         except JobCancelled:
             return True

@@ -10,6 +10,7 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
 
+    from addon.field_modifier import motion
     from addon.live import sessions
 
 pytestmark = pytest.mark.in_blender
@@ -60,6 +61,18 @@ def test_what_cannot_be_deformed_is_named(case):
     assert BROKEN[case] in str(caught.value), str(caught.value)
     assert "Error" not in str(caught.value).replace("Error: ", "", 1), str(caught.value)
     assert set(bpy.data.objects) == objects
+
+
+@pytest.mark.parametrize("name", ["set_rest", "add_handle", "mirror_handle", "remove_field"])
+def test_a_scale_that_flattens_is_named_by_what_needs_its_inverse(name):
+    item, _, moving = scenes.bar_with_handles("Mesh")
+    item.arapfields.moved_by = "WRAP"
+    motion.bind(bpy.context, item)
+    motion.write(item, motion.Motion(np.ones((len(item.data.vertices), 3))))
+    item.scale.z = 0
+    scenes.activate(moving, item)
+    with pytest.raises(RuntimeError, match="Mesh: its scale flattens it; give every axis a scale"):
+        getattr(bpy.ops.arapfields, name)()
 
 
 def test_without_a_mesh_the_operators_say_so():
