@@ -224,7 +224,7 @@ def restart(context, uid, session):
     try:
         begin(context, source, session.kind, session.keeps_shape)
     except UserError as error:
-        jobs.add_message("ERROR", about(source.name, error))
+        jobs.add_message("ERROR", about(source.name, UserError("{error}; live mode ended", error=error)))
 
 
 def return_all(context):

@@ -30,8 +30,9 @@ PREVIEW_CELLS = 96  # at most, of the implicit surface that is moved
 class SourceChanged(UserError):
     """The source was edited, or its handles or settings: the solver must be set up again."""
 
-    def __init__(self, name):
-        super().__init__("{name} changed while it was worked on; run again", name=name)
+    def __init__(self, name, reason=None):
+        reason = reason or UserError("{name} changed while it was worked on; run again", name=name)
+        super().__init__(reason.template, **reason.values)
 
 
 class SourceReader:
@@ -156,7 +157,11 @@ def points_now(context, source, surface):
     with modifier_stack.evaluated_mesh(context, source, surface.in_place) as mesh:
         points = mesh_arrays.positions(mesh)
     if len(points) != len(surface.local):
-        raise SourceChanged(source.name)
+        reason = UserError(
+            "{name}: modifiers before the field make other numbers of vertices at other frames", source
+        )
+        has_modifiers = modifier_stack.shown_before(source, surface.in_place)
+        raise SourceChanged(source.name, reason if has_modifiers else None)
     return points
 
 

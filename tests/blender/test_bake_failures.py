@@ -43,6 +43,18 @@ def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
     fails("Nothing that moves Bar is animated", range="HANDLES")
 
 
+def test_modifiers_that_make_other_vertices_as_frames_pass_are_named():
+    bar = animated()
+    subdivision = bar.modifiers.new("Subdivision", "SUBSURF")
+    for frame, levels in ((1, 1), (3, 2)):
+        subdivision.levels = levels
+        subdivision.keyframe_insert("levels", frame=frame)
+    bar.arapfields.result = "NEW"
+    bpy.context.scene.frame_set(1)
+    with pytest.raises(RuntimeError, match="Bar: modifiers before the field make other numbers of vertices"):
+        bpy.ops.arapfields.bake(start=1, end=5, format="KEYS")
+
+
 def test_a_bake_that_no_longer_fits_is_named():
     bar, folder = saved_animation()
     assert bpy.ops.arapfields.bake(range="HANDLES") == {"FINISHED"}
