@@ -18,6 +18,7 @@ from ..core.poses import Pose
 from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..field_modifier import layers
+from ..handles import empties
 from ..jobs.job_operator import JobOperator
 from ..live.sessions import end_for_job
 from ..poses import applying
@@ -47,6 +48,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
     surface, is_at_hand = read_at_rest(context, source, kind, in_place, output, **further)
     placed = PointsBefore(surface, surface.local if is_at_hand else points_now(context, source, surface))
     carried = carrying.poses(surface.space, depsgraph_of(context))
+    handle_count = len(empties.used(source))
     preview = None
     if operator.in_window:
         preview = (FirstResult if placement.keeps_mesh(output, result) else Preview)(surface)
@@ -100,7 +102,8 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
         operator.warnings += [about(owner.name, reason) for reason in carrying.take_warnings()]
         named = "" if item == owner else item.name
         shown = named + visibility.hidden_note(visibility.show_alone(owner, item))
-        return describe(shown.strip(), solved.report, np.ptp(surface.vertices, axis=0).max())
+        figures = solved.report | of_own_handles(solved.report, handle_count)
+        return describe(shown.strip(), figures, np.ptp(surface.vertices, axis=0).max())
 
     edits = () if result == "NEW" else (surface.reference,)
     return Item(source.name, work, apply, preview, edits)
@@ -141,6 +144,12 @@ class SolveOperator(JobOperator):
 
     def in_place(self, source):
         return placement.in_place(*destination(settings_of(source), self))
+
+
+def of_own_handles(report, count):
+    """The error of so many handles that come first; what pins keep at rest, which follows, is none."""
+    errors = [handle["error_max"] for handle in report.get("handles", ())][:count]
+    return {"handle_error_max": max(errors)} if errors else {}
 
 
 def describe(shown, report, size):

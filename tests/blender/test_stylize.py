@@ -13,9 +13,12 @@ import arapfields
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
+    from support.blender.pins import pin
     from support.blender.styles import SETTINGS, ball
 
+    from addon.core.runtime import jobs
     from addon.core.settings.styles import STYLES, style_identifier, style_name
+    from addon.live import sessions
 
 pytestmark = pytest.mark.in_blender
 
@@ -145,3 +148,22 @@ def test_a_material_bounds_the_region():
     item.arapfields.stylize.region_material = bpy.data.materials.new("unused")
     with pytest.raises(RuntimeError, match="does not use the material unused"):
         bpy.ops.arapfields.stylize(style="CUBE", **SETTINGS)
+
+
+def test_what_is_said_of_the_handles_leaves_out_what_pins_keep_at_rest():
+    item = ball()
+    points = scenes.world_points(item)
+    for side in (points[:, 0].argmax(), points[:, 0].argmin()):
+        pin(item, points[side])
+    sessions.end(bpy.context, item)
+    scenes.activate(item)
+    item.arapfields.stylize.use_handles = True
+    jobs.board.messages.clear()
+    assert item.arapfields.keep_rest
+    assert bpy.ops.arapfields.stylize(style="CUBE", **SETTINGS) == {"FINISHED"}
+    (line,) = (text for _, text in jobs.messages())
+    report = json.loads(bpy.data.objects["Ball_stylized"]["arapfields_report"])
+    errors = [handle["error_max"] for handle in report["handles"]]
+    share = float(line.split("within ")[1].split("%")[0]) / 100
+    size = np.ptp(points, axis=0).max()
+    assert len(errors) == 3 and max(errors[:2]) <= share * size < errors[2]
