@@ -213,6 +213,8 @@ double ContactPoints::follow(const RowMatrix<double>& coefficients, double reach
   for (Index block = 0; block < blocks(); ++block)
     if (!is_here(block) && (all || ways_.may_be_near(block, reach, ahead))) near.push_back(block);
   evaluate(near);
+  for (Index block = 0; moves && block < blocks(); ++block)
+    if (!is_here(block)) longest_ = std::max(longest_, ways_.last_way(block));
   if (size() > coarse_ && (!finer_here_ || places_.rows() < size())) evaluate_finer();
   return moves ? longest_ : 0.0;
 }

@@ -47,7 +47,8 @@ class ContactPoints {
   /// Where all places are.
   const Points& at(const RowMatrix<double>& coefficients);
   /// Brings places() there, but for blocks of which nothing is nearer to what they may meet than `reach`,
-  /// nor, `ahead`, after one more way as long as the last. Returns the longest way of those that it brings.
+  /// nor, `ahead`, after one more way as long as the last. Returns the longest way of those that it brings,
+  /// and of the one that others follow.
   double follow(const RowMatrix<double>& coefficients, double reach, bool ahead);
   const Points& places() const { return places_; }
   /// Where follow() did not bring all, they are brought.

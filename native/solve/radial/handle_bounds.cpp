@@ -16,8 +16,9 @@
 namespace arapfields {
 namespace {
 
-/// Sweeps over the planes of a handle, and the change, in cube units, below which these end.
-constexpr int most_sweeps = 200;
+/// Sweeps over the planes of a handle, how many of them in turn over those alone that push, and the change,
+/// in cube units, below which these end.
+constexpr int most_sweeps = 200, pushing_sweeps = 7;
 constexpr double settled = 1e-6;
 /// What lies under a point handle, in widths of the shape there: no farther from it at rest, nor aside of it
 /// as seen along a plane's normal.
@@ -32,6 +33,9 @@ constexpr int most_turns = 6;
 constexpr double turned_enough = 1e-4;
 /// Those that it ends so far from, in cube units, stay; so do those whose normal would be of another side.
 constexpr double near_bound = 0.05, same_side = 0.0;
+/// The same after a first turn, as a multiple of the last change of the translation: where that is small, the
+/// planes are as good as they were.
+constexpr double near_changes = 10.0;
 
 /// How little each handle gives way to others: what holds more, and what has moved less.
 Vector masses_of(const BoundHandles& handles) {
@@ -189,9 +193,10 @@ std::pair<Vec3, Index> HandleBounds::within(const std::vector<Bound>& bounds) {
     pushing.clear();
     for (std::size_t k = 0; k < bounds.size(); ++k)
       if (pushes[k] > 0.0) pushing.push_back(k);
-    for (double inner = change; sweep < most_sweeps && inner >= settled; ++sweep) {
+    double inner = change;
+    for (int k = 0; k < pushing_sweeps && sweep < most_sweeps && inner >= settled; ++k, ++sweep) {
       inner = 0.0;
-      for (const std::size_t k : pushing) inner = std::max(inner, change_by(k));
+      for (const std::size_t i : pushing) inner = std::max(inner, change_by(i));
     }
   }
   const auto most = std::max_element(pushes.begin(), pushes.end());
@@ -202,7 +207,7 @@ std::pair<Vec3, Index> HandleBounds::within(const std::vector<Bound>& bounds) {
 
 /// Where a translation would take what a handle holds, curved solids have other planes than where it is now.
 /// Whether any bound has become another one.
-bool HandleBounds::turn(std::vector<Bound>& bounds, const Vec3& way) const {
+bool HandleBounds::turn(std::vector<Bound>& bounds, const Vec3& way, double near) const {
   const RadialState& s = state_;
   bool any = false;
   for (Index k = 0; k < std::ssize(s.contact.surfaces()); ++k) {
@@ -210,7 +215,7 @@ bool HandleBounds::turn(std::vector<Bound>& bounds, const Vec3& way) const {
     if (surface.is_flat() || surface.is_sheet()) continue;
     std::vector<Bound*> of;
     for (Bound& bound : bounds)
-      if (bound.surface == k && bound.target && bound.normal.dot(way) - bound.depth < near_bound)
+      if (bound.surface == k && bound.target && bound.normal.dot(way) - bound.depth < near)
         of.push_back(&bound);
     if (of.empty()) continue;
     Points places(std::ssize(of), 3);
@@ -232,10 +237,13 @@ bool HandleBounds::turn(std::vector<Bound>& bounds, const Vec3& way) const {
 std::pair<Vec3, Index> HandleBounds::least_translation(Index handle) {
   std::vector<Bound>& bounds = bounds_of(handle);
   auto [way, surface] = within(bounds);
-  for (int turns = 0; surface >= 0 && turns < most_turns && turn(bounds, way); ++turns) {
+  double near = near_bound;
+  for (int turns = 0; surface >= 0 && turns < most_turns && turn(bounds, way, near); ++turns) {
     const Vec3 last = way;
     std::tie(way, surface) = within(bounds);
-    if ((way - last).norm() < turned_enough) break;
+    const double change = (way - last).norm();
+    if (change < turned_enough) break;
+    near = std::min(near_bound, near_changes * change);
   }
   return {way, surface};
 }
