@@ -3,13 +3,13 @@
 
 import argparse
 import re
-import sys
 from pathlib import Path, PurePath
 
 from ..core.settings.choices import BAKE_FORMATS, LIVE_KINDS, ORIENTATIONS, OUTPUTS, SKIN_GROUPS, SURFACES
 from ..core.settings.parameters import DEFORM, EXTRACTION, QUALITIES, SKIN
 from ..core.settings.styles import STYLES, STYLIZE
 from .contact_flags import NAMES, add_contact_flags
+from .one_line import OneLineParser
 
 FORMATS = ("ply", "obj", "stl", "blend")
 PARAMETERS = {"deform": DEFORM, "stylize": STYLIZE}
@@ -17,14 +17,6 @@ FLAGS = {"deform": ("handles",), "stylize": ("style", "frame")}  # of one verb, 
 SHARED = ("result", "surface", "resolution", "refine_thin", "quality")
 LONGEST = 1e7  # seconds; a wait cannot be much longer
 FILE = "file: .ply, .obj, .stl, or a .blend, in which each object's own settings and handles count"
-
-
-class OneLineParser(argparse.ArgumentParser):
-    """Errors are one line, with exit code 2."""
-
-    def error(self, message):
-        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
-        raise SystemExit(2)
 
 
 def parse(arguments):

@@ -162,6 +162,7 @@ def test_flags_come_back_as_the_same_settings(folders):
         (["batch", "-i", "a", "-o", "b", "--style", "cube", "--limit", "nan"], "--limit"),
         (["batch", "-i", "a", "-o", "b", "--style", "cube", "--limit", "inf"], "--limit"),
         (["batch", "-i", "a", "-o", "b", "--style", "cube", "--limit", "-1"], "--limit"),
+        (["bake", "-i", "a.blend", "--bogus"], "bake: unrecognized arguments: --bogus (see"),
     ],
 )
 def test_wrong_usage_is_one_line(arguments, text, capsys):

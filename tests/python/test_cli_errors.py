@@ -169,3 +169,9 @@ def test_interrupt_cancels_and_leaves_nothing(folder):
         running.kill()
     assert (running.returncode, printed) == (130, "arapfields deform: interrupted\n")
     assert contents(folder) == [str(folder / "mesh.obj")]
+
+
+@pytest.mark.parametrize("extra", ["--bogus", "b.ply"])
+def test_what_a_verb_does_not_know_points_to_its_own_help(extra, folder, capsys):
+    line = refusal(capsys, "sample", "a.ply", "--output", "out.ply", extra)
+    assert line == f"arapfields sample: unrecognized arguments: {extra} (see arapfields sample --help)\n"

@@ -3,7 +3,6 @@
 
 import argparse
 import re
-import sys
 from functools import partial
 
 import arapfields as af
@@ -20,16 +19,9 @@ from .flags import (
     solve_flags,
     style_flags,
 )
+from .one_line import OneLineParser
 from .options import add_option_flag, add_option_flags, shard
 from .touching import contact_flags
-
-
-class OneLineParser(argparse.ArgumentParser):
-    """Errors are one line, with exit code 2."""
-
-    def error(self, message):
-        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
-        raise SystemExit(2)
 
 
 class CMakeDir(argparse.Action):
