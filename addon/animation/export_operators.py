@@ -141,6 +141,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
             player = bpy.data.objects.new(f"{source.name}_baked", bake.mesh(context, source))
             context.scene.collection.objects.link(player)
             stack.callback(result_objects.discard, player)
+            result_objects.look_like(source, player)
             result_objects.place(context, source, player)
         bake.store.play_on(player)
         return player

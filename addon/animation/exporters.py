@@ -13,6 +13,7 @@ from ..blender.actions import curves_of
 from ..blender.evaluation import updated
 from ..core.errors import UserError
 from ..core.runtime.coroutines import Pause
+from ..results import result_objects
 from . import export_checks
 from .caches import plain, size_text
 from .frames import playing
@@ -146,6 +147,7 @@ class MorphingCopy:
                 evaluated, preserve_all_data_layers=True, depsgraph=depsgraph
             )
             self.item = bpy.data.objects.new(self.source.name, mesh)
+            result_objects.look_like(self.source, self.item)
             self.context.scene.collection.objects.link(self.item)
             self.item.matrix_world = self.world = world
             points = mesh_arrays.positions(mesh)

@@ -60,6 +60,7 @@ def show(context, source, kind, output, mesh, report, select=True):
     if item is None:
         item = bpy.data.objects.new(f"{source.name}{RESULT_SUFFIX[kind]}", mesh)
         collection(context).objects.link(item)
+        look_like(source, item)
     else:
         old, item.data = item.data, mesh
         if old.users == 0:
@@ -70,6 +71,19 @@ def show(context, source, kind, output, mesh, report, select=True):
     if select and context.view_layer.objects.active == source:
         select_only(context, item)
     return item
+
+
+SEEN_BY = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
+LOOKS = ("color", "pass_index", "is_shadow_catcher", "is_holdout", *(f"visible_{ray}" for ray in SEEN_BY))
+
+
+def look_like(source, item):
+    """Gives a new result what of the source's look is the object's own: materials, visibility to rays."""
+    for given, slot in zip(source.material_slots, item.material_slots, strict=False):
+        if given.link == "OBJECT":
+            slot.link, slot.material = "OBJECT", given.material
+    for name in LOOKS:
+        setattr(item, name, getattr(source, name))
 
 
 CHANNELS = ("rotation_mode", "location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle")

@@ -118,16 +118,30 @@ def test_what_is_exported_is_read_back(kind):
         assert read["range"].tolist() == [2, 5]
 
 
+def gltf(path):
+    """The JSON of a .glb file."""
+    content = path.read_bytes()
+    (length,) = struct.unpack("<I", content[12:16])
+    return json.loads(content[20 : 20 + length])
+
+
 def test_the_times_of_a_gltf_are_the_frames_seconds():
     _, folder = scene_to_export()
     bpy.ops.arapfields.export_animation(format="GLTF", filepath=str(folder / "a.glb"))
-    content = (folder / "a.glb").read_bytes()
-    (length,) = struct.unpack("<I", content[12:16])
-    header = json.loads(content[20 : 20 + length])
+    header = gltf(folder / "a.glb")
     (animation,) = header["animations"]
     times = header["accessors"][animation["samplers"][0]["input"]]
     assert np.allclose([*times["min"], *times["max"]], [2 / 25, 5 / 25]) and times["count"] == 4
     assert len(header["meshes"][0]["primitives"][0]["targets"]) == 4
+
+
+def test_a_gltf_has_the_materials_of_the_object():
+    bar, folder = scene_to_export()
+    bar.data.materials.append(bpy.data.materials.new("Mesh"))
+    bar.material_slots[0].link = "OBJECT"
+    bar.material_slots[0].material = bpy.data.materials.new("Object")
+    bpy.ops.arapfields.export_animation(format="GLTF", filepath=str(folder / "a.glb"))
+    assert [one["name"] for one in gltf(folder / "a.glb")["materials"]] == ["Object"]
 
 
 def test_the_times_of_an_alembic_are_seconds():

@@ -167,3 +167,25 @@ def test_what_a_worker_refuses_names_its_object_once():
 
     assert refusing(UserError("{name}: the mesh is empty", name="Bar")) == ["Bar: the mesh is empty"]
     assert refusing(ValueError("handles: none")) == ["Bar: handles: none"]
+
+
+@pytest.mark.parametrize("way", ["warp", "surface", "keys"])
+def test_a_result_looks_as_its_source_where_that_is_the_objects_own(way):
+    bar, _, moving = scenes.bar_with_handles()
+    scenes.decorate(bar)
+    slot, other = bar.material_slots[0], bpy.data.materials.new("Other")
+    slot.link, slot.material = "OBJECT", other
+    bar.color, bar.pass_index, bar.visible_shadow, bar.is_holdout = (1, 0, 0, 1), 4, False, True
+    for frame, height in ((1, 0.0), (2, 0.3)):
+        moving.location.z = height
+        moving.keyframe_insert("location", frame=frame)
+    if way == "keys":
+        bpy.ops.arapfields.bake(start=1, end=2, format="KEYS")
+    else:
+        bar.arapfields.surface, resolution = "EXACT", {"resolution": 32} if way == "surface" else {}
+        bpy.ops.arapfields.deform(output=way.upper(), **scenes.NEW, **resolution)
+    (result,) = (entry.item for entry in bar.arapfields.results)
+    assert [one.material.name for one in result.material_slots] == ["Other", "two"]
+    assert bar.data.materials[0].name == "one"
+    looks = tuple(result.color), result.pass_index, result.visible_shadow, result.is_holdout
+    assert looks == ((1, 0, 0, 1), 4, False, True)
