@@ -110,7 +110,7 @@ def place(context, source, item):
 
 
 def select_only(context, item):
-    if context.mode != "OBJECT":
+    if context.mode != "OBJECT" or context.view_layer.objects.get(item.name) != item:
         return
     for other in context.selected_objects:
         other.select_set(False)

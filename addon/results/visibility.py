@@ -18,16 +18,20 @@ def family(source):
 
 def show_alone(source, shown, for_now=False):
     """Hides what else of the family lies in the place of `shown`, from viewport and renders, and shows that
-    again where it had been set aside itself; `for_now`: until `give_back`. Returns names of what it hides.
+    again where it had been set aside itself; `for_now`: until `give_back`. Returns names of what is hidden.
+
+    Where the user hides `shown`, by its collection maybe, all else stays as it is.
     """
+    if settings_of(shown).set_aside:
+        change(shown, False, for_now)
+    if shown != source and not shown.visible_get():
+        return [shown.name]
     names = []
     for item in family(source):
         seen = not (item.hide_render and item.hide_get())
         if item != shown and seen and (item == source or is_where(shown, item)):
             names.append(item.name)
             change(item, True, for_now)
-    if settings_of(shown).set_aside:
-        change(shown, False, for_now)
     return names
 
 

@@ -82,3 +82,30 @@ def test_a_render_sees_the_source_again_when_it_takes_the_result_itself():
     scenes.activate(bar)
     bpy.ops.arapfields.deform(**scenes.QUICK, result="MODIFIER")
     assert seen() == ["Bar"]
+
+
+@pytest.mark.parametrize("way", ["excluded", "collection", "eye", "disabled"])
+def test_a_source_stays_where_its_result_cannot_be_seen(way):
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.ops.arapfields.deform(**scenes.NEW)
+    result = bpy.data.objects["Bar_deformed"]
+    before = scenes.world_points(result)
+    home = bpy.context.view_layer.layer_collection.children[result.users_collection[0].name]
+    if way == "excluded":
+        home.exclude = True
+    elif way == "collection":
+        home.hide_viewport = True
+    elif way == "eye":
+        result.hide_set(True)
+    else:
+        result.hide_viewport = True
+    bar.hide_set(False)
+    bar.hide_render = False
+    moving.location.z += 0.4
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.deform(**scenes.NEW) == {"FINISHED"}
+    assert "(Bar_deformed is hidden)" in jobs.messages()[-1][1]
+    assert bar.visible_get() and not bar.hide_render and not result.visible_get()
+    home.exclude = home.hide_viewport = result.hide_viewport = False
+    result.hide_set(False)
+    assert scenes.world_points(result)[:, 2].max() > before[:, 2].max() + 0.3
