@@ -23,13 +23,16 @@ class ObjectReference:
 
     def find(self):
         """The object even where it is in no scene, or None."""
+        named = bpy.data.objects.get(self.name)
+        if named is not None and named.session_uid == self.uid:
+            return named
         return next((item for item in bpy.data.objects if item.session_uid == self.uid), None)
 
 
 def in_scene(item):
     """Whether an object is there for the user: one that was deleted stays in the file while anything points
-    to it, but in no scene."""
-    return item is not None and any(holds(scene, item) for scene in bpy.data.scenes)
+    to it, but in no scene. Blender finds visible ones at once, others by going through a scene's objects."""
+    return item is not None and (item.visible_get() or any(holds(scene, item) for scene in bpy.data.scenes))
 
 
 def holds(scene, item):

@@ -229,7 +229,7 @@ def restart(context, uid, session):
 
 def return_all(context):
     """Has what an undone step says to be live be so again."""
-    for source in [item for item in bpy.data.objects if item.session_uid in live.returning]:
+    for source in [one for one in live.returning and bpy.data.objects if one.session_uid in live.returning]:
         former, kind = live.returning[source.session_uid], settings_of(source).live_kind
         try:
             begin(context, source, kind, former.keeps_shape)

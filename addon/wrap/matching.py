@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where a target lies on the object that was wrapped onto it, and what that makes of the object's keys."""
 
+import json
+
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
-from ..blender.object_references import ObjectReference
+from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import is_in_place, transform
 from ..core.runtime import native
@@ -15,6 +17,7 @@ from .given import Given
 
 LEAST_POSE = 1e-5  # of the target's size: an armature at rest moves by less, by rounding
 FAR = 0.05  # of the target's diagonal: a wrap leaves half of the vertices nearer than that
+OFF = 0.01  # of the target's diagonal: a vertex farther away does not lie on the wrapped shape
 LOOKED_AT = 1000  # vertices at most, to see how far two surfaces are apart
 
 
@@ -34,6 +37,25 @@ def seen(context, source, target, is_posed):
     return shape if len(shape) == len(own) else own
 
 
+def mark_of(target):
+    """A text that is equal while the target's own vertices and faces are where they were."""
+    digest, faces = mesh_arrays.fingerprint(target.data)
+    return f"{digest.hex()} {faces}"
+
+
+class Wrapped:
+    """What a wrap is made with, kept for a later transfer."""
+
+    def __init__(self, source, target):
+        self.ends = ObjectReference(source), ObjectReference(target)
+        self.shown_keys, self.mark = json.dumps(keys.shown(source)), mark_of(target)
+
+    def put(self):
+        source, target = (end.find() for end in self.ends)
+        wrap = settings_of(source).wrap
+        wrap.shown_keys, wrap.target_mark = self.shown_keys, self.mark if wrap.onto == target else ""
+
+
 def distance(points, surface):
     """How far from a surface half of the points are at most."""
     return np.median(np.abs(surface(points[:: -(-len(points) // LOOKED_AT)])))
@@ -46,7 +68,9 @@ class Match:
         self.ends = ObjectReference(source), ObjectReference(target)
         self.given = Given(context, source)
         self.moved = self.moved_beside(source, target)
-        self.triangles, self.mark = mesh_arrays.triangles(target.data), mesh_arrays.fingerprint(target.data)
+        self.triangles, self.mark = mesh_arrays.triangles(target.data), mark_of(target)
+        wrap = settings_of(source).wrap
+        self.is_edited = target == wrap.onto and wrap.target_mark not in ("", self.mark)
         self.unposed, self.posed = (seen(context, source, target, is_posed) for is_posed in (False, True))
         self.offsets = keys.offsets(source) if with_keys else None
 
@@ -54,7 +78,9 @@ class Match:
         """Finds the places of the target's vertices, and the displacements (k, m, 3) of its keys."""
         with_keys = self.offsets is not None
         task = tracker.start("Comparing", 0.3 if with_keys else 1.0)
-        self.own = self.met()
+        wrapped = native.library().MeshSdf(self.moved, self.given.triangles)
+        self.own = self.met(wrapped)
+        tracker.warnings += self.off(wrapped) if self.is_edited else []
         self.places = self.places_of(self.own, self.triangles, task)
         self.displacements = self.carried(tracker.start("Shape Keys", 1.0)) if with_keys else None
 
@@ -65,7 +91,7 @@ class Match:
         has_same_keys = self.offsets is None or np.array_equal(keys.offsets(source), self.offsets)
         if not (is_there and has_same_keys):
             raise UserError("{name} changed while it was worked on; run again", source)
-        if mesh_arrays.fingerprint(target.data) != self.mark:
+        if mark_of(target) != self.mark:
             raise UserError("{name} changed while it was worked on; run again", target)
         return source, target
 
@@ -73,23 +99,35 @@ class Match:
         """(n, 3) vertices of the wrapped source in the target's coordinates, as keys are."""
         return transform(np.linalg.inv(matrix_of(target)) @ matrix_of(source), self.given.moved)
 
-    def met(self):
+    def met(self, wrapped):
         """The target's vertices as they were wrapped onto: a pose may have come after the wrap.
 
         UserError where most of the wrapped source and most of the target lie far from the other.
         """
-        mesh_sdf = native.library().MeshSdf
-        wrapped = mesh_sdf(self.moved, self.given.triangles)
         distances = [distance(vertices, wrapped) for vertices in (self.unposed, self.posed)]
         own = self.unposed if distances[0] <= distances[1] else self.posed
         far = FAR * np.linalg.norm(np.ptp(own, axis=0))
-        if min(distances) > far and distance(self.moved, mesh_sdf(own, self.triangles)) > far:
+        if min(distances) > far and distance(self.moved, native.library().MeshSdf(own, self.triangles)) > far:
             raise UserError(
                 "{name} does not lie on {target}; move it back, or wrap again",
                 self.ends[0],
                 target=self.ends[1].name,
             )
         return own
+
+    def off(self, wrapped):
+        """[UserError] where vertices of the target, which was edited since, are not where it was wrapped."""
+        far = OFF * np.linalg.norm(np.ptp(self.own, axis=0))
+        count = np.count_nonzero(np.abs(wrapped(self.own)) > far)
+        if not count:
+            return []
+        edited = UserError(
+            "{target} was edited after the wrap; vertices that no longer lie on {name}: {count}",
+            self.ends[0],
+            target=self.ends[1].name,
+            count=count,
+        )
+        return [edited]
 
     def places_of(self, vertices, triangles, task=None):
         """Where the vertices of a mesh lie on the wrapped source."""

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-import json
 from dataclasses import replace
 
 import bpy
@@ -28,7 +27,7 @@ from ..jobs.job_operator import JobOperator
 from ..properties.choices import result_properties
 from ..results.placement import holds_place
 from . import keys, landmarks, transfer
-from .matching import Match
+from .matching import Match, Wrapped
 from .properties import carried_kinds, fit_rig, move_object
 
 onto = text(
@@ -87,8 +86,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         else:
             pairs = landmarks.read(source, space)
         vertices, triangles = landmarks.read_target(context, other, space)
-        marks = landmarks.Marks(source)
-        shown_keys = json.dumps(keys.shown(source))
+        marks, wrapped = landmarks.Marks(source), Wrapped(source, other)
 
         def solve(tracker, rest, samples, weight):
             task = tracker.start("Wrapping", weight)
@@ -104,16 +102,16 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
 
         places = effective_value("move_object", settings.wrap, self) and not holds_place(source)
         item = plan_solve_job(context, self, source, "WRAP", values["samples"], values["seed"], solve, places)
-        return self.with_rest(item, marks, shown_keys, fitting, below, Followers(context, source))
+        return self.with_rest(item, marks, wrapped, fitting, below, Followers(context, source))
 
-    def with_rest(self, item, marks, shown_keys, fitting, below, followers):
+    def with_rest(self, item, marks, wrapped, fitting, below, followers):
         """The same item, which marks landmarks and moves bones and handles as well."""
 
         def apply(solved):
             said, context, source = item.apply(solved), bpy.context, marks.source.get()
             marks.put()
             if self.in_place(source):
-                settings_of(source).wrap.shown_keys = shown_keys
+                wrapped.put()
             for one in below:
                 one.kept = True
             if fitting is not None:

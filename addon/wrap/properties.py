@@ -31,6 +31,11 @@ def row_chosen(wrap, context):
                 select_alone(context, item, extend=item == pair.rest)
 
 
+def forget_target(wrap, context):
+    """Another target was not wrapped onto yet."""
+    wrap.target_mark = ""
+
+
 def fit_rig(**extra):
     return flag(
         "Fit Armature",
@@ -74,6 +79,7 @@ class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
             "Onto",
             "Mesh object that this one is wrapped onto; it may be open and broken, as scans are",
             poll=is_target,
+            update=forget_target,
         ),
         "frames": pointer(
             bpy.types.Collection,
@@ -88,6 +94,7 @@ class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
         "fit_rig": fit_rig(),
         "move_object": move_object(),
         "transfer": carried_kinds(),
+        "target_mark": text("Target's Mark", "What tells whether the target is as it was wrapped onto"),
         "shown_keys": text("Shown Keys", "Values of the shape keys that the wrap was made with, as JSON"),
         **annotations(WRAP),
     }

@@ -2,6 +2,7 @@
 """Live mode, stepped by hand: without a window Blender runs no timers."""
 
 import tempfile
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ if IN_BLENDER:
     from support.blender import scenes
     from support.blender.live import step
 
+    from addon.core.geometry import spaces
     from addon.core.runtime import jobs
     from addon.live import sessions
 
@@ -160,3 +162,16 @@ def test_what_cannot_be_live_is_named():
         bpy.ops.arapfields.live()
     with pytest.raises(RuntimeError, match="not live"):
         bpy.ops.arapfields.live_keep()
+
+
+def test_a_look_at_handles_that_rest_computes_no_motion_again():
+    *_, moving = scenes.bar_with_handles()
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.4
+    step(refined=True)
+    with mock.patch.object(spaces, "pose", wraps=spaces.pose) as computed:
+        step()
+        assert not computed.called
+        moving.location.z += 0.1
+        step()
+        assert computed.called

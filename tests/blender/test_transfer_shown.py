@@ -9,12 +9,15 @@ from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
+    from mathutils import Vector
     from support.blender import scenes
     from support.blender.baking import cancelled_at, changed_at_work
     from support.blender.stacks import add_modifier
     from support.blender.stages import Operator
+    from support.blender.wraps import SMALL
 
     from addon.blender import mesh_arrays, modifier_stack
+    from addon.core.runtime import jobs
     from addon.field_modifier import motion
     from addon.wrap import keys
     from addon.wrap.operators import ARAPFIELDS_OT_transfer
@@ -136,6 +139,43 @@ def test_a_wrap_that_was_moved_off_its_target_is_not_handed_on(moved):
     assert not target.vertex_groups and target.data.shape_keys is None
     bpy.data.objects[moved].location.x -= 3
     assert bpy.ops.arapfields.transfer() == {"FINISHED"} and wrong_weights(target) < 1e-3
+
+
+def stretch(target):
+    """The last vertices along the bar leave it."""
+    for vertex in target.data.vertices:
+        vertex.co.x += vertex.co.x > 0.99
+
+
+def grow(target):
+    """Another bar above it is joined to the mesh."""
+    other = scenes.bar("Other")
+    other.location = target.location + Vector((0, 0, 1))
+    scenes.activate(other, target)
+    bpy.ops.object.join()
+
+
+EDITS = {"stretched": stretch, "grown": grow, "untouched": lambda target: None}
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_a_target_that_was_edited_after_the_wrap_says_where_it_is_off(edit):
+    item, target = pair()
+    scenes.activate(item)
+    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+    before = mesh_arrays.positions(target.data)
+    EDITS[edit](target)
+    scenes.activate(item)
+    jobs.board.messages.clear()
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"} and target.vertex_groups["Along"]
+    after = mesh_arrays.positions(target.data)
+    count = len(after) - len(before) or np.count_nonzero((after != before).any(axis=1))
+    assert (edit == "untouched") == (count == 0)
+    said = f"Scan was edited after the wrap; vertices that no longer lie on Bar: {count}"
+    assert [text for level, text in jobs.messages() if level == "WARNING"] == [said] * bool(count)
+    jobs.board.messages.clear()
+    assert bpy.ops.arapfields.wrap(**SMALL) == bpy.ops.arapfields.transfer() == {"FINISHED"}
+    assert not any("edited" in text for _, text in jobs.messages())
 
 
 def transferred_meanwhile(change):

@@ -6,6 +6,7 @@ Q = U Vᵀ orthogonal (a mirror included) and P = V S Vᵀ / s the stretch that 
 solve → world is s·Q and the location. Without non-uniform scale P is the identity.
 """
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -165,11 +166,20 @@ def upright(turn):
 
 def rigid_motion(rest, target):
     """The proper rigid motion that takes the pose of one matrix to that of the other; scale is ignored."""
+    return _rigid_motion(
+        *(np.asarray(matrix, dtype=np.float64).tobytes() for matrix in (rest, target))
+    ).copy()
+
+
+@functools.lru_cache(maxsize=4096)
+def _rigid_motion(rest, target):
+    """As rigid_motion, of bytes: live mode looks at handles that rest again and again."""
+    rest, target = (np.frombuffer(matrix).reshape(4, 4) for matrix in (rest, target))
     motion = pose(target) @ inverse(pose(rest))
     left, _, right = np.linalg.svd(motion[:3, :3])
     mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
     motion[:3, :3] = left @ mirror @ right
-    motion[:3, 3] = np.asarray(target, float)[:3, 3] - motion[:3, :3] @ np.asarray(rest, float)[:3, 3]
+    motion[:3, 3] = target[:3, 3] - motion[:3, :3] @ rest[:3, 3]
     return motion
 
 
