@@ -16,39 +16,13 @@ constexpr double longest_pull = 0.01;
 /// Handles farther from their targets against a force, in cube units, are held back.
 constexpr double held_back = 0.02;
 
-/// A handle that is far from its target.
-struct Away {
-  Index handle;
-  double distance;  // of its samples, on average
-  Vec3 middle;      // of where they are
-  Vec3 left;        // on average, to where they belong
-};
+}  // namespace
 
-std::vector<Away> away_from_targets(RadialState& s, const RadialObjective<float>& objective) {
-  const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();
-  const Points& targets = s.handles.pairs().targets;
-  const Index own = s.handles.any() ? s.handles.own_count() : 0;
-  std::vector<Away> result;
-  for (Index first = 0, last = 0; first < own; first = last) {
-    const Index handle = s.handles.handle_of(first);
-    while (last < own && s.handles.handle_of(last) == handle) ++last;
-    const Points left = (targets - values).middleRows(first, last - first);
-    const double distance = left.rowwise().norm().mean();
-    if (distance < held_back) continue;
-    const Vec3 middle = values.middleRows(first, last - first).colwise().mean();
-    result.push_back({handle, distance, middle, left.colwise().mean().transpose()});
-  }
-  return result;
-}
-
-/// Takes motions of handles back, each by the least translation after which all that the handle holds is
-/// beyond the planes that were found. Returns which surface asks for the most of it; −1: none.
-std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions, const std::vector<bool>& which) {
+std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
   std::vector<Index> by(motions.size(), -1);
   if (motions.empty() || s.contact.found().planes.empty()) return by;
   HandleBounds bounds(s, motions);
   for (std::size_t i = 0; i < motions.size(); ++i) {
-    if (!which[i]) continue;
     const auto [way, surface] = bounds.least_translation(static_cast<Index>(i));
     motions[i].topRightCorner<3, 1>() += way;
     by[i] = surface;
@@ -56,10 +30,8 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions, const s
   return by;
 }
 
-}  // namespace
-
 void set_reachable_targets(RadialState& s, std::vector<Mat4> motions, bool gently) {
-  const std::vector<Index> by = hold_back(s, motions, std::vector<bool>(motions.size(), true));
+  const std::vector<Index> by = hold_back(s, motions);
   Points targets = s.handles.targets_at(motions);
   RadialObjective<float>& objective = *s.fast.objective.latest();
   const Index own = gently && s.contact.itself() && s.handles.any() ? s.handles.own_count() : 0;
@@ -81,22 +53,27 @@ void set_reachable_targets(RadialState& s, std::vector<Mat4> motions, bool gentl
 std::vector<HeldBack> held_back_handles(RadialState& s) {
   std::vector<HeldBack> result;
   const RadialObjective<float>& objective = s.objective(s.fast);  // of the planes that were found last
-  const std::vector<Away> handles = away_from_targets(s, objective);
-  if (handles.empty()) return result;
   const Points places = contact_places(s);
+  const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();
+  const Points& targets = s.handles.pairs().targets;
+  const Index own = s.handles.any() ? s.handles.own_count() : 0;
   std::vector<Mat4> motions = motions_of(s.handles.bound());
-  std::vector<bool> which(motions.size());
-  for (const Away& away : handles) which[static_cast<std::size_t>(away.handle)] = true;
-  const std::vector<Index> surfaces = hold_back(s, motions, which);
-  for (const Away& away : handles) {
-    const Vector along =
-        s.contact.found().forces_at(away.middle, places.data(), s.contact.surface_count()) * away.left;
+  const std::vector<Index> surfaces = hold_back(s, motions);
+  for (Index first = 0, last = 0; first < own; first = last) {
+    const Index handle = s.handles.handle_of(first);
+    while (last < own && s.handles.handle_of(last) == handle) ++last;
+    const Points left = (targets - values).middleRows(first, last - first);
+    const double distance = left.rowwise().norm().mean();
+    if (distance < held_back) continue;
+    const Vec3 middle = values.middleRows(first, last - first).colwise().mean();
+    const Vector along = s.contact.found().forces_at(middle, places.data(), s.contact.surface_count()) *
+                         left.colwise().mean().transpose();
     Index by = 0;
     const bool pressed = along.minCoeff(&by) < 0.0;
-    const Index back = surfaces[static_cast<std::size_t>(away.handle)];
+    const Index back = surfaces[static_cast<std::size_t>(handle)];
     if (back >= 0 || pressed)
       result.push_back(
-          {away.handle, s.contact.name_of(back >= 0 ? back : by), s.problem.frame().scale * away.distance});
+          {handle, s.contact.name_of(back >= 0 ? back : by), s.problem.frame().scale * distance});
   }
   return result;
 }

@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
-#include <utility>
 
 #include "core/decompositions.h"
 #include "core/jacobians.h"
@@ -25,12 +23,6 @@ constexpr double same_side = 0.5;
 constexpr double over_edge = 0.05;
 /// Neighbours that a surface of second degree is fitted to, at least.
 constexpr Index least_fitted = 5;
-
-constexpr Index block_size = RadialEvaluator<float>::block_size;
-
-double longest_way(PointsIn from, PointsIn to) {
-  return std::sqrt((to - from).rowwise().squaredNorm().maxCoeff());
-}
 
 }  // namespace
 
@@ -185,77 +177,25 @@ void ContactPoints::coarsen() {
   places_.conservativeResize(std::min<Index>(places_.rows(), coarse_), Eigen::NoChange);
 }
 
-bool ContactPoints::is_whole() const { return std::find(here_.begin(), here_.end(), false) == here_.end(); }
-
 const Points& ContactPoints::at(const RowMatrix<double>& coefficients) {
-  follow(coefficients, std::numeric_limits<double>::infinity(), false);
-  return places_;
-}
-
-/// No place is there yet.
-void ContactPoints::go_to(const RowMatrix<double>& coefficients) {
-  if (ways_.count() == 0)
-    ways_ = BlockWays(problem_.basis, rest_.topRows(coarse_),
-                      embedded_.topRows(std::min(embedded_.rows(), coarse_)));
-  ways_.move_to(coefficients);
+  const Index n = coarse_, all = size();
+  if (!is_at(coefficients)) places_.resize(0, 3);
   coefficients_ = coefficients;
-  places_.conservativeResize(std::max(places_.rows(), coarse_), Eigen::NoChange);
-  were_ = std::exchange(here_, std::vector<bool>(static_cast<std::size_t>(ways_.count())));
-  were_.resize(here_.size());
-  finer_here_ = false;
-  longest_ = 0.0;
-}
-
-double ContactPoints::follow(const RowMatrix<double>& coefficients, double reach, bool ahead) {
-  const bool moves = !is_at(coefficients), all = std::isinf(reach);
-  if (moves) go_to(coefficients);
-  std::vector<Index> near;
-  for (Index block = 0; block < blocks(); ++block)
-    if (!is_here(block) && (all || ways_.may_be_near(block, reach, ahead))) near.push_back(block);
-  evaluate(near);
-  for (Index block = 0; moves && block < blocks(); ++block)
-    if (!is_here(block)) longest_ = std::max(longest_, ways_.last_way(block));
-  if (size() > coarse_ && (!finer_here_ || places_.rows() < size())) evaluate_finer();
-  return moves ? longest_ : 0.0;
-}
-
-/// The evaluator's values at some of its blocks, or all.
-void ContactPoints::evaluate(const std::vector<Index>& blocks) {
-  if (blocks.empty()) return;
-  const RadialEvaluator<float>& evaluator = evaluator_.get({1}, [&] {
-    const Points embedded = embedded_.topRows(std::min(embedded_.rows(), coarse_));
-    return RadialEvaluator<float>(problem_.basis, rest_.topRows(coarse_), JetOrder::value,
-                                  embedded.rows() > 0 ? &embedded : nullptr);
-  });
-  rounded_.resize(coarse_, 3);
-  evaluator.evaluate(coefficients_, {rounded_.data(), coarse_, JetOrder::value}, &blocks);
-  for (const Index block : blocks) {
-    const Index first = block_size * block, count = std::min(block_size, coarse_ - first);
-    const Points now = rounded_.middleRows(first, count).cast<double>();
-    const auto which = static_cast<std::size_t>(block);
-    longest_ = std::max(
-        longest_, were_[which] ? longest_way(now, places_.middleRows(first, count)) : ways_.last_way(block));
-    places_.middleRows(first, count) = now;
-    here_[which] = true;
-    ways_.see(block, now);
-  }
-}
-
-void ContactPoints::evaluate_finer() {
-  const Index count = size() - coarse_;
-  const RadialEvaluator<float>& evaluator = finer_.get({finer_places_}, [&] {
-    const Points embedded = embedded_.bottomRows(embedded_.rows() > 0 ? count : 0);
-    return RadialEvaluator<float>(problem_.basis, rest_.bottomRows(count), JetOrder::value,
-                                  embedded.rows() > 0 ? &embedded : nullptr);
-  });
-  PointsF places(count, 3);
-  evaluator.evaluate(coefficients_, {places.data(), count, JetOrder::value});
-  const Points now = places.cast<double>();
-  const Index known = finer_here_ ? 0 : places_.rows() - coarse_;
-  if (known > 0) longest_ = std::max(longest_, longest_way(now.topRows(known), places_.bottomRows(known)));
-  places_.conservativeResize(size(), Eigen::NoChange);
-  places_.bottomRows(count) = now;
-  finer_here_ = true;
+  const Index known = places_.rows();
+  places_.conservativeResize(all, Eigen::NoChange);
+  const auto fill = [&](Dependent<RadialEvaluator<float>, 1>& made, Revision of, Index first, Index count) {
+    const RadialEvaluator<float>& evaluator = made.get({of}, [&] {
+      const Points embedded = embedded_.middleRows(first, embedded_.rows() > 0 ? count : 0);
+      return RadialEvaluator<float>(problem_.basis, rest_.middleRows(first, count), JetOrder::value,
+                                    embedded.rows() > 0 ? &embedded : nullptr);
+    });
+    PointsF places(count, 3);
+    evaluator.evaluate(coefficients, {places.data(), count, JetOrder::value});
+    places_.middleRows(first, count) = places.cast<double>();
+  };
+  if (known < n) fill(evaluator_, 1, 0, n);
+  if (all > std::max(n, known)) fill(finer_, finer_places_, n, all - n);
+  return places_;
 }
 
 Points ContactPoints::normals_at(const RowMatrix<double>& coefficients, const std::vector<Index>* blocks) {

@@ -6,7 +6,6 @@
 
 #include "core/point_grid.h"
 #include "fields/radial_evaluator.h"
-#include "solve/radial/block_ways.h"
 #include "solve/radial/problem.h"
 
 namespace arapfields {
@@ -44,24 +43,7 @@ class ContactPoints {
   /// No finer places.
   void coarsen();
 
-  /// Where all places are.
   const Points& at(const RowMatrix<double>& coefficients);
-  /// Brings places() there, but for blocks of which nothing is nearer to what they may meet than `reach`,
-  /// nor, `ahead`, after one more way as long as the last. Returns the longest way of those that it brings,
-  /// and of the one that others follow.
-  double follow(const RowMatrix<double>& coefficients, double reach, bool ahead);
-  const Points& places() const { return places_; }
-  /// Where follow() did not bring all, they are brought.
-  const Points& whole() { return at(coefficients_); }
-  bool is_whole() const;
-  /// Whether places() of a block of RadialEvaluator::block_size are where the coefficients take them; those
-  /// that are finer are.
-  bool is_here(Index block) const { return here_[static_cast<std::size_t>(block)]; }
-  Index blocks() const { return std::ssize(here_); }
-  /// Of a block, nothing that it may meet is nearer, as follow() counts on.
-  void set_free(Index block, double way) { ways_.set_free(block, way); }
-  /// What the places may meet has come nearer by no more than that.
-  void narrow(double way) { ways_.narrow(way); }
   /// Whether these were the last ones.
   bool is_at(const RowMatrix<double>& coefficients) const {
     return coefficients.rows() == coefficients_.rows() && coefficients == coefficients_;
@@ -71,9 +53,6 @@ class ContactPoints {
   Points normals_at(const RowMatrix<double>& coefficients, const std::vector<Index>* blocks = nullptr);
 
  private:
-  void go_to(const RowMatrix<double>& coefficients);
-  void evaluate(const std::vector<Index>& blocks);
-  void evaluate_finer();
   Points finer(Index sample);
   Points embedded_at(PointsIn places) const;
 
@@ -93,12 +72,6 @@ class ContactPoints {
   Dependent<RadialEvaluator<float>, 1> finer_;
   RowMatrix<double> coefficients_;  // of the places that were asked for last
   Points places_;
-  PointsF rounded_;          // all but the finer ones, as they were evaluated
-  bool finer_here_ = false;  // whether finer ones are where they belong
-  std::vector<bool> here_;   // blocks
-  std::vector<bool> were_;   // that were with the coefficients before
-  BlockWays ways_;
-  double longest_ = 0.0;                         // way of those that are here
   Dependent<RadialEvaluator<float>, 1> slopes_;  // of the samples
 };
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -91,40 +90,6 @@ std::vector<Index> at_edges(const ContactSet& found, ContactPoints& points,
   return edges;
 }
 
-/// Of each surface the rows of places that may be nearer to it than `reach`, of what is where it belongs.
-/// Nothing presses on the others.
-std::vector<std::vector<Index>> near_rows(ContactPoints& points, const ContactWays& ways,
-                                          const std::vector<BarrierSurface>& surfaces, double reach,
-                                          RowMatrix<double>& pressures) {
-  const Points& places = points.places();
-  std::vector<std::vector<Index>> rows(surfaces.size());
-  if (surfaces.empty()) return rows;
-  const auto look = [&](Index row) {
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k < surfaces.size(); ++k) {
-      const auto column = static_cast<Index>(k);
-      const double way = (places.row(row) - ways.seen[k].row(row)).norm();
-      const double free = ways.clear(row, column) - way - surfaces[k].margin();
-      if (free < reach)
-        rows[k].push_back(row);
-      else
-        pressures(row, column) = 0.0;
-      least = std::min(least, free);
-    }
-    return least;
-  };
-  constexpr Index size = RadialEvaluator<float>::block_size;
-  for (Index block = 0; block < points.blocks(); ++block) {
-    if (!points.is_here(block)) continue;
-    double least = std::numeric_limits<double>::infinity();
-    for (Index row = size * block; row < std::min(size * (block + 1), points.coarse_count()); ++row)
-      least = std::min(least, look(row));
-    points.set_free(block, least);
-  }
-  for (Index row = points.coarse_count(); row < places.rows(); ++row) look(row);
-  return rows;
-}
-
 }  // namespace
 
 void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients) {
@@ -194,11 +159,25 @@ void ContactTerms::release() {
   touches_itself_ = false;
 }
 
-/// Adds the planes of obstacles and the ground for these places of each.
-void ContactTerms::find_outside(const std::vector<std::vector<Index>>& of_surfaces) {
+/// Places that may have a plane.
+std::vector<Index> ContactTerms::near_rows() const {
+  std::vector<Index> rows;
+  for (Index i = 0; i < places_.rows(); ++i)
+    for (Index k = 0; k < ways_.clear.cols(); ++k) {
+      const auto which = static_cast<std::size_t>(k);
+      const double way = (places_.row(i) - ways_.seen[which].row(i)).norm();
+      if (ways_.clear(i, k) - way < near + further_ + surfaces_[which].margin()) {
+        rows.push_back(i);
+        break;
+      }
+    }
+  return rows;
+}
+
+/// Adds the planes of obstacles and the ground for these places.
+void ContactTerms::find_outside(const std::vector<Index>& rows) {
+  const Points now = rows_of(places_, rows);
   for (Index k = 0; k < ways_.clear.cols(); ++k) {
-    const std::vector<Index>& rows = of_surfaces[static_cast<std::size_t>(k)];
-    const Points now = rows_of(places_, rows);
     const Vector distances = add_planes(k, rows, now);
     for (Index i = 0; i < now.rows(); ++i) {
       if (distances[i] <= 0.0) continue;  // it was last outside before
@@ -213,27 +192,25 @@ double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<d
   if (known_ && !grips_ && !jumped && further.value_or(0.0) <= further_ && points_.is_at(coefficients))
     return deepest_;
   known_ = true;
-  const double reach = self_ ? std::numeric_limits<double>::infinity() : near + further.value_or(0.0);
-  const double way = points_.follow(coefficients, reach, !further);
-  further_ = further.value_or(way);
-  if (!further) points_.follow(coefficients, near + further_, true);
-  places_ = points_.places();
+  const Points before = std::exchange(places_, points_.at(coefficients));
+  further_ = further ? *further : std::sqrt((places_ - before).rowwise().squaredNorm().maxCoeff());
   grips_ = false;
   found_.planes.clear();
   deepest_ = 0.0;
-  find_outside(near_rows(points_, ways_, surfaces_, near + further_, pressures_));
+  find_outside(near_rows());
   const std::vector<Index> edges = at_edges(found_, points_, surfaces_);
   const Index known = points_.size();
   points_.refine(edges);
   if (points_.size() > known) {
-    points_.follow(coefficients, 0.0, false);
-    places_ = points_.places();
+    const Points finer = points_.at(coefficients).bottomRows(points_.size() - known);
+    places_.conservativeResize(points_.size(), Eigen::NoChange);
+    places_.bottomRows(finer.rows()) = finer;
     pressures_.conservativeResize(places_.rows(), Eigen::NoChange);
-    pressures_.bottomRows(places_.rows() - known).setZero();
+    pressures_.bottomRows(finer.rows()).setZero();
     add_finer_ways();
-    std::vector<Index> rows(static_cast<std::size_t>(places_.rows() - known));
+    std::vector<Index> rows(static_cast<std::size_t>(finer.rows()));
     std::iota(rows.begin(), rows.end(), known);
-    find_outside(std::vector(surfaces_.size(), rows));
+    find_outside(rows);
   }
   deepest_outside_ = deepest_;
   ahead_ = false;

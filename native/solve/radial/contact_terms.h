@@ -32,7 +32,7 @@ class ContactTerms {
   /// The ways start here, without pressure, and obstacles are where they belong.
   void begin(const RowMatrix<double>& coefficients) { resume({}, coefficients); }
   /// What the next step depends on; begins there with it.
-  ContactState held();
+  ContactState held() const;
   void resume(const ContactState& state, const RowMatrix<double>& coefficients);
   /// The coordinates of the cube have moved rigidly.
   void change_coordinates(const Mat4& motion);
@@ -86,7 +86,8 @@ class ContactTerms {
  private:
   void gather_surfaces();
   void see(Index k);
-  void find_outside(const std::vector<std::vector<Index>>& rows);
+  std::vector<Index> near_rows() const;
+  void find_outside(const std::vector<Index>& rows);
   Vector add_planes(Index k, const std::vector<Index>& rows, PointsIn now);
   void add_finer_ways();
   void add_own_planes(const RowMatrix<double>& coefficients, bool jumped);

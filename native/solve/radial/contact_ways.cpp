@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The ways that a surface took beside obstacles, which may move, and what a next step needs of them.
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "solve/radial/contact_terms.h"
@@ -71,9 +70,8 @@ void ContactTerms::see(Index k) {
   ways_.clear.col(k) = surfaces_[static_cast<std::size_t>(k)].distances(places_);
 }
 
-ContactState ContactTerms::held() {
+ContactState ContactTerms::held() const {
   ContactState state;
-  if (any() && !points_.is_whole()) places_ = points_.whole();
   for (const BarrierSurface& surface : surfaces_) state.placements.push_back(surface.placement());
   for (Index row = 0; row < std::min<Index>(pressures_.rows(), points_.coarse_count()); ++row)
     for (Index k = 0; k < pressures_.cols(); ++k)
@@ -89,11 +87,10 @@ ContactState ContactTerms::held() {
   return state;
 }
 
-double ContactWays::carry(Index surface, const Mat4& motion) {
+void ContactWays::carry(Index surface, const Mat4& motion) {
   const auto k = static_cast<std::size_t>(surface);
-  const Points before = std::exchange(seen[k], affine_image(seen[k], motion));
+  seen[k] = affine_image(seen[k], motion);
   anchors[k] = affine_image(anchors[k], motion);
-  return before.rows() > 0 ? std::sqrt((seen[k] - before).rowwise().squaredNorm().maxCoeff()) : 0.0;
 }
 
 void ContactWays::add(const std::vector<Index>& like) {
@@ -108,7 +105,6 @@ void ContactWays::add(const std::vector<Index>& like) {
 }
 
 void ContactTerms::change_coordinates(const Mat4& motion) {
-  if (any() && !points_.is_whole()) places_ = points_.whole();
   for (std::size_t k = 0; k < starts_.size(); ++k) {
     starts_[k] = motion * starts_[k];
     surfaces_[k].set_placement(starts_[k]);
@@ -130,7 +126,7 @@ void ContactTerms::move_obstacles(double share, bool ahead) {
     else
       surfaces_[which].set_placement(ends_[which]);
     carried_[which] = surfaces_[which].placement() * before.inverse();
-    points_.narrow(ways_.carry(k, carried_[which]));
+    ways_.carry(k, carried_[which]);
   }
 }
 
@@ -160,7 +156,6 @@ ContactWays ContactTerms::ways() const {
 void ContactTerms::set_ways(ContactWays ways) {
   if (self_) self_->set_ways(std::move(ways.own));
   ways_ = std::move(ways);
-  points_.narrow(std::numeric_limits<double>::infinity());
   known_ = false;
   add_finer_ways();
 }

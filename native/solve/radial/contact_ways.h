@@ -49,8 +49,8 @@ struct ContactWays {
     const std::vector<bool>& samples = crossed[static_cast<std::size_t>(surface)];
     return !samples.empty() && samples[static_cast<std::size_t>(sample)];
   }
-  /// The surface and all that belongs to it have moved: by how much at most.
-  double carry(Index surface, const Mat4& motion);
+  /// The surface and all that belongs to it have moved.
+  void carry(Index surface, const Mat4& motion);
   /// Adds places, which are where the others at these rows are.
   void add(const std::vector<Index>& like);
   /// Of those that were added last, the ones of samples that the surface crosses begin where they are.

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
-#include <utility>
 
 #include "fields/radial_evaluator.h"
 #include "sampling/oriented_points.h"
@@ -16,9 +15,8 @@
 namespace arapfields {
 namespace {
 
-/// Sweeps over the planes of a handle, how many of them in turn over those alone that push, and the change,
-/// in cube units, below which these end.
-constexpr int most_sweeps = 200, pushing_sweeps = 7;
+/// Sweeps over the planes of a handle, and the change, in cube units, below which these end.
+constexpr int most_sweeps = 200;
 constexpr double settled = 1e-6;
 /// What lies under a point handle, in widths of the shape there: no farther from it at rest, nor aside of it
 /// as seen along a plane's normal.
@@ -33,9 +31,6 @@ constexpr int most_turns = 6;
 constexpr double turned_enough = 1e-4;
 /// Those that it ends so far from, in cube units, stay; so do those whose normal would be of another side.
 constexpr double near_bound = 0.05, same_side = 0.0;
-/// The same after a first turn, as a multiple of the last change of the translation: where that is small, the
-/// planes are as good as they were.
-constexpr double near_changes = 10.0;
 
 /// How little each handle gives way to others: what holds more, and what has moved less.
 Vector masses_of(const BoundHandles& handles) {
@@ -174,29 +169,18 @@ void HandleBounds::bind_to_itself(const ContactPlane& plane, const Vec3& normal,
   bounds_of(second.holder).push_back({-normal, (1.0 - own) * depth, plane.obstacle});
 }
 
-/// By the method of Hildreth (1957): sweeps over all bounds, and between these over the ones that push, until
-/// they rest.
+/// By the method of Hildreth (1957).
 std::pair<Vec3, Index> HandleBounds::within(const std::vector<Bound>& bounds) {
   Vec3 way = Vec3::Zero();
   std::vector<double> pushes(bounds.size(), 0.0);
-  const auto change_by = [&](std::size_t k) {
-    const double next = std::max(0.0, pushes[k] + bounds[k].depth - bounds[k].normal.dot(way));
-    const double change = next - std::exchange(pushes[k], next);
-    if (change != 0.0) way += change * bounds[k].normal;
-    return std::abs(change);
-  };
-  std::vector<std::size_t> pushing;
   double change = settled;
   for (int sweep = 0; sweep < most_sweeps && change >= settled; ++sweep) {
     change = 0.0;
-    for (std::size_t k = 0; k < bounds.size(); ++k) change = std::max(change, change_by(k));
-    pushing.clear();
-    for (std::size_t k = 0; k < bounds.size(); ++k)
-      if (pushes[k] > 0.0) pushing.push_back(k);
-    double inner = change;
-    for (int k = 0; k < pushing_sweeps && sweep < most_sweeps && inner >= settled; ++k, ++sweep) {
-      inner = 0.0;
-      for (const std::size_t i : pushing) inner = std::max(inner, change_by(i));
+    for (std::size_t k = 0; k < bounds.size(); ++k) {
+      const double next = std::max(0.0, pushes[k] + bounds[k].depth - bounds[k].normal.dot(way));
+      way += (next - pushes[k]) * bounds[k].normal;
+      change = std::max(change, std::abs(next - pushes[k]));
+      pushes[k] = next;
     }
   }
   const auto most = std::max_element(pushes.begin(), pushes.end());
@@ -207,7 +191,7 @@ std::pair<Vec3, Index> HandleBounds::within(const std::vector<Bound>& bounds) {
 
 /// Where a translation would take what a handle holds, curved solids have other planes than where it is now.
 /// Whether any bound has become another one.
-bool HandleBounds::turn(std::vector<Bound>& bounds, const Vec3& way, double near) const {
+bool HandleBounds::turn(std::vector<Bound>& bounds, const Vec3& way) const {
   const RadialState& s = state_;
   bool any = false;
   for (Index k = 0; k < std::ssize(s.contact.surfaces()); ++k) {
@@ -215,7 +199,7 @@ bool HandleBounds::turn(std::vector<Bound>& bounds, const Vec3& way, double near
     if (surface.is_flat() || surface.is_sheet()) continue;
     std::vector<Bound*> of;
     for (Bound& bound : bounds)
-      if (bound.surface == k && bound.target && bound.normal.dot(way) - bound.depth < near)
+      if (bound.surface == k && bound.target && bound.normal.dot(way) - bound.depth < near_bound)
         of.push_back(&bound);
     if (of.empty()) continue;
     Points places(std::ssize(of), 3);
@@ -237,13 +221,10 @@ bool HandleBounds::turn(std::vector<Bound>& bounds, const Vec3& way, double near
 std::pair<Vec3, Index> HandleBounds::least_translation(Index handle) {
   std::vector<Bound>& bounds = bounds_of(handle);
   auto [way, surface] = within(bounds);
-  double near = near_bound;
-  for (int turns = 0; surface >= 0 && turns < most_turns && turn(bounds, way, near); ++turns) {
+  for (int turns = 0; surface >= 0 && turns < most_turns && turn(bounds, way); ++turns) {
     const Vec3 last = way;
     std::tie(way, surface) = within(bounds);
-    const double change = (way - last).norm();
-    if (change < turned_enough) break;
-    near = std::min(near_bound, near_changes * change);
+    if ((way - last).norm() < turned_enough) break;
   }
   return {way, surface};
 }

@@ -52,7 +52,7 @@ class HandleBounds {
   void bind_to_surface(const ContactPlane& plane, const Vec3& normal, const Place& place, bool over);
   void bind_to_itself(const ContactPlane& plane, const Vec3& normal, const Place& first, const Place& second);
   std::vector<Bound>& bounds_of(Index handle) { return bounds_[static_cast<std::size_t>(handle)]; }
-  bool turn(std::vector<Bound>& bounds, const Vec3& way, double near) const;
+  bool turn(std::vector<Bound>& bounds, const Vec3& way) const;
 
   RadialState& state_;
   const std::vector<Mat4>& motions_;

@@ -225,7 +225,7 @@ void RadialSolver::set_secondary_motion(const std::optional<SecondaryMotion>& mo
 }
 
 MotionState RadialSolver::motion_state() const {
-  RadialState& s = *state_;
+  const RadialState& s = *state_;
   RowMatrix<double> velocities = s.dynamics.velocities;
   if (velocities.size() == 0) velocities.setZero(s.problem.basis.size(), 3);
   return {s.shape.coefficients, velocities, s.dynamics.accelerations, s.dynamics.motions, s.contact.held()};
