@@ -17,7 +17,7 @@ from ..core.geometry.spaces import inverse, similarity, transform
 from ..core.poses import Pose
 from ..core.runtime import native
 from ..core.runtime.jobs import Item
-from ..field_modifier import layers
+from ..field_modifier import layers, unseen
 from ..handles import empties
 from ..jobs.job_operator import JobOperator
 from ..live.sessions import end_for_job
@@ -99,7 +99,8 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
             placement.put(bpy.context, item, solved.place)
         applying.solved[owner.session_uid] = pose
         carrying.put(bpy.context, solved.carried)
-        operator.warnings += [about(owner.name, reason) for reason in carrying.take_warnings()]
+        reasons = carrying.take_warnings() + (unseen.reasons(owner) if item == owner else [])
+        operator.warnings += [about(owner.name, reason) for reason in reasons]
         named = "" if item == owner else item.name
         shown = named + visibility.hidden_note(visibility.show_alone(owner, item))
         figures = solved.report | of_own_handles(solved.report, handle_count)

@@ -12,7 +12,7 @@ from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..core.runtime.coroutines import run_to_completion, step_for
 from ..core.runtime.latest_request_worker import REST, LatestRequestWorker
-from ..field_modifier import layers, motion
+from ..field_modifier import layers, motion, unseen
 from ..results import placement, visibility
 from ..solver import secondary_motion, style_settings
 from ..solver.frame_range import animation_range
@@ -58,6 +58,7 @@ class Session:
         settings.live_kind, settings.live_number = kind, self.number
         if earlier is None and self.display.in_place:
             stored.put_mark(source, stored.UNSETTLED)
+            self.carrying.warnings += unseen.reasons(source)
         self._reading = self._start(context)
 
     @property

@@ -18,6 +18,7 @@ if IN_BLENDER:
 
     from addon.blender import modifier_stack
     from addon.blender.object_references import source_of
+    from addon.core.runtime import jobs
     from addon.field_modifier import inputs
     from addon.surface import staleness
 
@@ -201,3 +202,22 @@ def test_moving_the_modifier_does_not_age_the_fit():
     bar.data.update()
     bpy.context.view_layer.update()
     assert staleness.reason(bar)
+
+
+@pytest.mark.parametrize("way", ["off", "factor", "keyed"])
+def test_a_modifier_that_shows_nothing_is_named(way):
+    bar, *_ = scenes.bar_with_handles()
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    modifier = bar.modifiers[0]
+    if way == "factor":
+        inputs.put(modifier, "Factor", 0.0)
+    else:
+        modifier.show_viewport = False
+    if way == "keyed":
+        modifier.keyframe_insert("show_viewport", frame=1)
+    said = "The modifier ARAP Fields of Bar is off, or its Factor 0"
+    jobs.board.messages.clear()
+    for press in (lambda: bpy.ops.arapfields.deform(**scenes.QUICK), bpy.ops.arapfields.live):
+        scenes.activate(bar)
+        assert press() == {"FINISHED"}
+    assert [text for level, text in jobs.messages() if level == "WARNING"] == [said] * 2 * (way != "keyed")
