@@ -24,6 +24,12 @@ READ = {
 }
 
 
+def for_blender(path):
+    """The path as Blender takes it, which tells relative ones from PWD: a program may have started it in
+    another folder."""
+    return os.path.abspath(path)
+
+
 def check(path):
     """The path with a suffix that can be read and written; UserError otherwise."""
     if path.suffix.lower().lstrip(".") not in FORMATS:
@@ -62,10 +68,10 @@ def read(path):
         raise nothing
     try:
         if path.suffix.lower() == ".blend":
-            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
+            bpy.ops.wm.open_mainfile(filepath=for_blender(path), load_ui=False)
             return
         bpy.ops.wm.read_homefile(use_empty=True)
-        READ[path.suffix.lower()](str(path))
+        READ[path.suffix.lower()](for_blender(path))
     except RuntimeError as error:
         reason = str(error).removeprefix("Error: ").strip()
         raise UserError(f"{path}: Blender cannot read it ({reason})") from error
@@ -99,7 +105,10 @@ def write(path, items):
 
 
 def export(path, items):
-    where, suffix = {"filepath": str(path), **AXES, "export_selected_objects": True}, path.suffix.lower()
+    where, suffix = (
+        {"filepath": for_blender(path), **AXES, "export_selected_objects": True},
+        path.suffix.lower(),
+    )
     if suffix == ".ply":
         bpy.ops.wm.ply_export(**where, apply_modifiers=False)
     elif suffix == ".stl":
@@ -131,13 +140,13 @@ def write_blend(path):
 
     with whole_file(path, beside=True) as partial:
         try:
-            bpy.ops.wm.save_as_mainfile(filepath=str(partial), copy=True, relative_remap=True)
+            bpy.ops.wm.save_as_mainfile(filepath=for_blender(partial), copy=True, relative_remap=True)
         except RuntimeError as error:
             if shutil.disk_usage(path.parent).free < ROOM:
                 raise not_whole(path) from error
             raise UserError(f"{path}: {error}") from error
         try:
-            with bpy.data.libraries.load(str(partial)):
+            with bpy.data.libraries.load(for_blender(partial)):
                 pass
         except OSError as error:
             raise not_whole(path) from error
