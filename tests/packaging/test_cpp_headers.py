@@ -116,6 +116,13 @@ def test_what_is_exported_is_what_headers_mark(prefix):
     assert not missing, f"marked, but without a symbol: {missing}"
 
 
+def test_the_python_module_exports_its_start_alone():
+    """Of what the standard library has, torch would find ours, where the compiler links it statically."""
+    (module,) = LIBRARY.parent.glob("_native*.so")
+    found = run("nm", "-D", "--defined-only", module).splitlines()
+    assert [line.split()[-1].partition("@")[0] for line in found] == ["PyInit__native"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "folder", sorted(path.name for path in NATIVE.iterdir() if (path / "CMakeLists.txt").exists())
