@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from support.geometry import cases
 from support.programs.cli import wait_until_loaded
 
 import arapfields as af
+from arapfields._interrupts import uninterrupted
 
 TESTS = str(Path(__file__).parents[1])
 SCRIPT = """
@@ -96,3 +98,11 @@ def test_a_handler_that_raises_nothing_changes_nothing():
     finally:
         signal.signal(signal.SIGINT, before)
     assert len(seen) == 1 and field.report.out_of_time
+
+
+def test_a_handler_that_is_not_pythons_stays():
+    """Blender without a window handles Ctrl-C itself; Python has None for its handler, and cannot set it."""
+    none = mock.patch.object(signal, "getsignal", return_value=None)
+    with none, mock.patch.object(signal, "signal") as put, uninterrupted():
+        pass
+    assert not put.called

@@ -8,8 +8,13 @@ import threading
 
 @contextlib.contextmanager
 def uninterrupted():
-    """Ctrl-C during the block takes effect at its end."""
-    if threading.current_thread() is not threading.main_thread():
+    """Ctrl-C during the block takes effect at its end.
+
+    Not on other threads, nor where the program that embeds Python has a handler of its own, as Blender
+    without a window does: Python cannot put that back, and it raises nothing.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    if not is_main or signal.getsignal(signal.SIGINT) is None:
         yield
         return
     waiting = []
