@@ -105,10 +105,8 @@ def write(path, items):
 
 
 def export(path, items):
-    where, suffix = (
-        {"filepath": for_blender(path), **AXES, "export_selected_objects": True},
-        path.suffix.lower(),
-    )
+    where = {"filepath": for_blender(path), **AXES, "export_selected_objects": True}
+    suffix = path.suffix.lower()
     if suffix == ".ply":
         bpy.ops.wm.ply_export(**where, apply_modifiers=False)
     elif suffix == ".stl":

@@ -6,14 +6,15 @@
 #include <functional>
 #include <limits>
 #include <queue>
+#include <utility>
 
 #include "core/parallel.h"
 #include "sampling/inner_balls.h"
+#include "sampling/parts.h"
 
 namespace arapfields {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 /// Share of the smaller radius by which a center may lie outside the larger ball.
 constexpr double overlap_share = 0.25;
 /// Neighbours on one sheet: at most so many spacings apart, normals with at least this cosine.
@@ -43,42 +44,24 @@ InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing, c
   join_parts(nodes);
 }
 
-/// Prim's tree, in which edges that exist cost nothing: what it adds joins the parts.
+/// What edges do not connect are parts.
 void InteriorGraph::join_parts(PointsIn nodes) {
-  const Index n = size();
-  std::vector<double> cost(n, infinity);
-  std::vector<Index> from(n, 0);
-  std::vector<bool> reached(n, false);
-  std::vector<Index> open{0};
-  for (Index count = 0; count < n;) {
-    while (!open.empty()) {  // all that edges connect
+  std::vector<Index> parts(edges_.size(), -1), open;
+  for (Index start = 0, count = 0; start < size(); ++start) {
+    if (parts[start] >= 0) continue;
+    parts[start] = count;
+    for (open.push_back(start); !open.empty();) {
       const Index i = open.back();
       open.pop_back();
-      if (reached[i]) continue;
-      reached[i] = true;
-      ++count;
       for (const Edge& edge : edges(i))
-        if (!reached[edge.to]) open.push_back(edge.to);
-      if (count == n) return;
-      cost[i] = -1.0;  // not yet offered to the rest
+        if (std::exchange(parts[edge.to], count) < 0) open.push_back(edge.to);
     }
-    for (Index i = 0; i < n; ++i) {
-      if (!reached[i] || cost[i] >= 0.0) continue;
-      cost[i] = 0.0;
-      for (Index j = 0; j < n; ++j) {
-        if (reached[j]) continue;
-        const double square = (nodes.row(i) - nodes.row(j)).squaredNorm();
-        if (square < cost[j]) cost[j] = square, from[j] = i;
-      }
-    }
-    Index best = -1;
-    for (Index j = 0; j < n; ++j)
-      if (!reached[j] && (best < 0 || cost[j] < cost[best])) best = j;
-    const Index other = from[best];
-    const float length = static_cast<float>(std::sqrt(cost[best]));
-    edges_[best].push_back({static_cast<std::int32_t>(other), length});
-    edges_[other].push_back({static_cast<std::int32_t>(best), length});
-    open.push_back(best);
+    ++count;
+  }
+  for (const auto& [from, to] : spanning_links(nodes, parts, {0})) {
+    const auto length = static_cast<float>(std::sqrt((nodes.row(from) - nodes.row(to)).squaredNorm()));
+    edges_[from].push_back({static_cast<std::int32_t>(to), length});
+    edges_[to].push_back({static_cast<std::int32_t>(from), length});
   }
 }
 

@@ -76,7 +76,7 @@ std::vector<PartLink> spanning_links(PointsIn points, const std::vector<Index>& 
   std::iota(left.begin(), left.end(), Index{0});
   std::vector<double> squares(parts.size(), std::numeric_limits<double>::infinity());
   while (true) {
-    const auto ends = std::partition(left.begin(), left.end(), [&](Index i) {
+    const auto ends = std::stable_partition(left.begin(), left.end(), [&](Index i) {
       return std::find(joined.begin(), joined.end(), parts[at(i)]) == joined.end();
     });
     const std::vector<Index> added(ends, left.end());
