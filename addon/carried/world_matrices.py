@@ -95,6 +95,11 @@ def unposed_parent(item, rigs, depsgraph, rest_of):
     return array(parent.evaluated_get(depsgraph).matrix_world) @ matrix @ tail @ inverse
 
 
+def at_present_rest(item, depsgraph):
+    """What takes the own motion of an object on a bone to the world while the armature has no pose."""
+    return unposed_parent(item, (item.parent,), depsgraph, present_rest)
+
+
 def first_rest(rig, name):
     """A bone's rest before any fit."""
     bones, poses, lengths = resting(rig)

@@ -10,7 +10,7 @@ from ..blender.object_references import in_scene, settings_of
 from ..carried.carried_objects import carrier_class
 from ..carried.rest_bones import above_field
 from ..carried.transforms import TransformCarrier
-from ..carried.world_matrices import array, world_matrices
+from ..carried.world_matrices import array, at_present_rest, world_matrices
 from ..core.errors import UserError
 from ..core.geometry import fitting
 from ..core.geometry.spaces import inverse, transform
@@ -18,13 +18,13 @@ from ..core.runtime import native
 from ..field_modifier import motion
 from ..handles.empties import matrix_of
 from ..names import COPY_OF
+from . import rigs
 
 
-def copies(context, source, target, given, own, rigs):
+def copies(context, source, target, given, own):
     """(count, notes): a copy for the target of each object that the source carries.
 
-    `given`: what the source has. `own`: the target's vertices and triangles. `rigs`: armatures of the source,
-    and what the target has for them.
+    `given`: what the source has. `own`: the target's vertices and triangles.
     """
     world, there = matrix_of(source), matrix_of(target)
     body = fitting.Body(
@@ -32,7 +32,8 @@ def copies(context, source, target, given, own, rigs):
         (transform(world, given.rest), transform(world, given.moved), given.triangles),
         (transform(there, own[0]), own[1]),
     )
-    done, notes = 0, []
+    twins, made, notes = rigs.twins(source, target), {}, []
+    posing = {rig: twins[rig] for rig in above_field(source) if rig in twins}
     for entry in settings_of(source).carried:
         item = entry.item
         if not in_scene(item) or item == target or item.type == "ARMATURE":
@@ -48,9 +49,11 @@ def copies(context, source, target, given, own, rigs):
         except UserError as error:
             notes.append(str(error))
             continue
-        put(copy_of(item, target), target, matrix, shape, rigs)
-        done += 1
-    return done, notes
+        made[item] = copy_of(item, target, posing)
+        put(context, made[item], target, matrix, shape, posing)
+    for copied in made.values():
+        rigs.retarget(copied, twins | made)
+    return len(made), notes
 
 
 def placed(context, source, item, entry, body):
@@ -90,11 +93,12 @@ def fitted(context, source, item, body):
     return shape, shape + same.displacements(np.array(points))
 
 
-def copy_of(item, target):
+def copy_of(item, target, posing):
     """The copy that an earlier transfer made, or a new one."""
-    for child in target.children:
-        if child.get(COPY_OF) == item.name:
-            return child
+    for parent in (target, *posing.values()):
+        for child in parent.children:
+            if child.get(COPY_OF) == item.name:
+                return child
     copied = item.copy()
     if item.data is not None:
         copied.data = item.data.copy()
@@ -107,15 +111,18 @@ def copy_of(item, target):
     return copied
 
 
-def put(copied, target, matrix, shape, rigs):
-    """Where it belongs, as a child of the target, posed by the target's armatures."""
-    copied.parent, copied.parent_type = target, "OBJECT"
-    copied.matrix_parent_inverse = target.matrix_world.inverted()
+def put(context, copied, target, matrix, shape, posing):
+    """Where it belongs: a child of the target, or of the same bone of its armature as what was copied."""
+    rig, bone = bone_of(copied, posing)
+    copied.parent, copied.parent_type = (target, "OBJECT") if rig is None else (rig, "BONE")
+    if rig is not None:
+        copied.parent_bone = bone
+    copied.matrix_parent_inverse = Matrix()
+    depsgraph = depsgraph_of(context)
+    parent = matrix_of(target) if rig is None else at_present_rest(copied, depsgraph)
+    copied.matrix_parent_inverse = Matrix(inverse(parent).tolist())
     copied.delta_location, copied.delta_rotation_euler, copied.delta_scale = (0,) * 3, (0,) * 3, (1,) * 3
-    copied.matrix_world = Matrix(matrix.tolist())
-    for modifier in copied.modifiers:
-        if modifier.type == "ARMATURE" and modifier.object in rigs:
-            modifier.object = rigs[modifier.object]
+    copied.matrix_basis = Matrix(matrix.tolist())
     if shape is None:
         return
     back = inverse(matrix)
@@ -123,3 +130,14 @@ def put(copied, target, matrix, shape, rigs):
     if shape[1] is not None:
         for block, points in zip(copied.data.shape_keys.key_blocks, shape[1], strict=True):
             mesh_arrays.put_vectors(block.data, transform(back, points), "co")
+
+
+def bone_of(copied, posing):
+    """(armature of the target, name of a bone) on which a copy is to hang; (None, "") where on none."""
+    item = copied
+    while item.parent is not None:
+        rig = posing.get(item.parent, item.parent if item.parent in posing.values() else None)
+        if item.parent_type == "BONE" and rig is not None and item.parent_bone in rig.data.bones:
+            return rig, item.parent_bone
+        item = item.parent
+    return None, ""

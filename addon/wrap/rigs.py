@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Armatures that a target has of its own, and drivers that read them."""
+"""Armatures that a target has of its own, and what reads them: drivers, modifiers, constraints."""
 
 from ..blender.object_references import settings_of
 
@@ -12,6 +12,14 @@ def pairs(source, target):
         for given, there in both
         if there is not None and given.type == there.type == "ARMATURE" and there.object is not None
     }
+
+
+def twins(source, target):
+    """{what the source has: what the target has for it}, of objects and their data."""
+    own = {source: target, source.data: target.data}
+    for given, there in pairs(source, target).items():
+        own |= {given: there, given.data: there.data}
+    return own
 
 
 def copied(rig, target):
@@ -30,7 +38,7 @@ def copy_drivers(source, target):
     given, keys = source.data.shape_keys, target.data.shape_keys
     if given.animation_data is None:
         return
-    own = {source: target, source.data: target.data, given: keys, **pairs(source, target)}
+    own = {**twins(source, target), given: keys}
     for curve in given.animation_data.drivers:
         if keys.animation_data is not None and keys.animation_data.drivers.find(curve.data_path):
             keys.driver_remove(curve.data_path)
@@ -39,3 +47,13 @@ def copy_drivers(source, target):
             for read in variable.targets:
                 if own.get(read.id) is not None:
                     read.id = own[read.id]
+
+
+def retarget(item, own):
+    """What the modifiers and constraints of a copy point to, its twin takes the place of."""
+    ends = [*item.modifiers, *item.constraints]
+    ends += [one for constraint in item.constraints for one in getattr(constraint, "targets", ())]
+    for end in ends:
+        for field in end.bl_rna.properties:
+            if field.type == "POINTER" and not field.is_readonly and getattr(end, field.identifier) in own:
+                setattr(end, field.identifier, own[getattr(end, field.identifier)])

@@ -155,9 +155,7 @@ class Transfer:
 
     def carried(self):
         own = self.own, self.match.triangles
-        done, notes = garments.copies(
-            self.context, self.source, self.target, self.given, own, rigs.pairs(self.source, self.target)
-        )
+        done, notes = garments.copies(self.context, self.source, self.target, self.given, own)
         self.notes += notes
         return done
 

@@ -190,7 +190,10 @@ def test_what_hangs_on_a_fitted_bone_lies_where_the_field_takes_it(posed):
     assert bpy.ops.arapfields.transfer() == {"FINISHED"}
     copies = {item["arapfields_copy_of"]: item for item in bpy.data.objects if "arapfields_copy_of" in item}
     assert sorted(copies) == ["Lamp", "Patch", "Spot"]
-    rig.pose.bones["Upper"].rotation_euler.x = 0.0  # the copies of what hangs on bones have no pose
+    twin = bpy.data.objects["Rig Soup"]
+    assert all((one.parent, one.parent_bone) == (twin, "Upper") for one in copies.values())
+    for one in (rig, twin):
+        one.pose.bones["Upper"].rotation_euler.x = 0.0
     bpy.context.view_layer.update()
     on_bar = scenes.world_points(item)[corner]
     assert np.linalg.norm(scenes.world_points(copies["Patch"])[0] - on_bar) < 3 * NEAR

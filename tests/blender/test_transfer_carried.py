@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a wrapped character carries, handed on to its target, which has an armature of its own then."""
+
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER
+
+if IN_BLENDER:
+    import bpy
+    from mathutils import Vector
+    from support.blender import scenes, wraps
+    from support.blender.character import link
+
+pytestmark = pytest.mark.in_blender
+
+
+def ball(name, at):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=8, ring_count=6, radius=0.05, location=at)
+    bpy.context.object.name = name
+    return bpy.context.object
+
+
+def hung_on(rig, item, parent):
+    """Makes it a child of a bone, or of what hangs on one, where it is."""
+    bpy.context.view_layer.update()
+    world = item.matrix_world.copy()
+    item.parent, item.parent_type, item.parent_bone = parent, "BONE" if parent == rig else "OBJECT", "Upper"
+    bpy.context.view_layer.update()
+    item.matrix_world = world
+
+
+def copies():
+    return {item["arapfields_copy_of"]: item for item in bpy.data.objects if "arapfields_copy_of" in item}
+
+
+def places(items):
+    bpy.context.view_layer.update()
+    return {name: scenes.world_points(item).mean(axis=0) for name, item in items.items()}
+
+
+@pytest.mark.parametrize("way", ["FOLLOW", "RIGID"])
+def test_eyes_on_a_bone_hang_on_the_same_bone_of_the_targets_armature(way):
+    item, rig = wraps.rigged_bar()
+    item.arapfields.wrap.onto = wraps.soup_of(item)
+    spot = link("Spot", None)
+    eyes = ball("Eye", (0.6, -0.3, 0.1)), ball("Other", (0.6, -0.3, 0.25))
+    hung_on(rig, spot, rig)
+    for eye, parent in zip(eyes, (rig, spot), strict=True):
+        hung_on(rig, eye, parent)
+    scenes.activate(*eyes, item)
+    bpy.ops.arapfields.carry(way=way)
+    upper = rig.pose.bones["Upper"]
+    upper.rotation_mode, upper.rotation_euler.x = "XYZ", 0.3
+    assert bpy.ops.arapfields.wrap(**wraps.SMALL) == {"FINISHED"}
+    for _ in range(2):
+        assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+        twin = bpy.data.objects["Rig Soup"]
+        assert sorted(copies()) == ["Eye", "Other"]
+        for angle in (0.3, 0.0, -0.6):
+            for one in (rig, twin):
+                one.pose.bones["Upper"].rotation_euler.x = angle
+            mine, theirs = places({eye.name: eye for eye in eyes}), places(copies())
+            for name, place in mine.items():
+                assert np.linalg.norm(theirs[name] - place) < 0.03, (name, angle, theirs[name] - place)
+
+
+def test_modifiers_and_constraints_of_copies_read_what_the_target_has():
+    item, rig = wraps.rigged_bar()
+    target = wraps.soup_of(item)
+    item.arapfields.wrap.onto = target
+    eye, spot = ball("Eye", (0.6, -0.3, 0.1)), link("Spot", None)
+    spot.location = Vector((0.6, -2, 0.1))
+    away = eye.modifiers.new("Near", "VERTEX_WEIGHT_PROXIMITY")
+    away.target = item
+    sees, bone = eye.constraints.new("DAMPED_TRACK"), eye.constraints.new("LIMIT_DISTANCE")
+    sees.target, bone.target, bone.subtarget = spot, rig, "Upper"
+    bone.distance = 20.0
+    scenes.activate(eye, spot, item)
+    bpy.ops.arapfields.carry()
+    assert bpy.ops.arapfields.wrap(**wraps.SMALL) == {"FINISHED"}
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    made = copies()["Eye"]
+    assert made.modifiers["Near"].target == target
+    assert [one.target for one in made.constraints] == [copies()["Spot"], bpy.data.objects["Rig Soup"]]
+    assert away.target == item and [one.target for one in eye.constraints] == [spot, rig]
