@@ -9,7 +9,7 @@ from ..blender import mesh_arrays, modifier_stack
 from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError, refuse
-from ..core.geometry.spaces import transform, unflattened
+from ..core.geometry.spaces import facing, transform, unflattened
 from ..field_modifier import masks, motion
 from ..field_nodes import helper
 from . import refusals
@@ -50,7 +50,7 @@ class Carrying:
                 self.warnings.append(error)
                 continue
             rest = space.world_to_solve @ world_matrices(item, self.rigs, depsgraph, under=self.under).rest
-            meshes.append((transform(rest, mesh.vertices), mesh.triangles))
+            meshes.append((transform(rest, mesh.vertices), facing(mesh.triangles, rest)))
         return meshes
 
     # Main thread, each time something may have moved.

@@ -9,7 +9,7 @@ from mathutils.kdtree import KDTree
 from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.object_references import ObjectReference
 from ..core.errors import UserError, refuse
-from ..core.geometry.spaces import inverse, is_in_place, space_of, transform
+from ..core.geometry.spaces import facing, inverse, is_in_place, space_of, transform
 from ..handles.movers import matrix_of
 from ..stiffness import painted
 
@@ -65,12 +65,11 @@ def read(context, item, rig, groups):
         stiffness = painted.of_weights(item, vertex_groups.weights_in(mesh, painted_groups))
     own = mesh_arrays.positions(item.data)
     keeps = all(m.type in modifier_stack.KEEPING for m in before) and len(own) == len(arrays.vertices)
-    mirrored = np.linalg.det(to_rig[:3, :3]) < 0
     return Shape(
         ObjectReference(item),
         arrays,
         transform(to_rig, arrays.vertices),
-        arrays.triangles[:, ::-1] if mirrored else arrays.triangles,
+        facing(arrays.triangles, to_rig),
         to_rig,
         None if keeps else nearest(arrays.vertices, own),
         kept_weights(item, rig, groups),

@@ -13,7 +13,7 @@ from ..carried.transforms import TransformCarrier
 from ..carried.world_matrices import array, at_present_rest, world_matrices
 from ..core.errors import UserError
 from ..core.geometry import fitting
-from ..core.geometry.spaces import inverse, transform
+from ..core.geometry.spaces import facing, inverse, transform
 from ..core.runtime import native
 from ..field_modifier import motion
 from ..handles.empties import matrix_of
@@ -24,13 +24,15 @@ from . import rigs
 def copies(context, source, target, given, own):
     """(count, notes): a copy for the target of each object that the source carries.
 
-    `given`: what the source has. `own`: the target's vertices and triangles.
+    `given`: what the source has, whose triangles face as the target's do. `own`: the target's vertices and
+    triangles.
     """
     world, there = matrix_of(source), matrix_of(target)
+    wrapped, onto = (facing(triangles, there) for triangles in (given.triangles, own[1]))
     body = fitting.Body(
         native.library(),
-        (transform(world, given.rest), transform(world, given.moved), given.triangles),
-        (transform(there, own[0]), own[1]),
+        (transform(world, given.rest), transform(world, given.moved), wrapped),
+        (transform(there, own[0]), onto),
     )
     twins, made, notes = rigs.twins(source, target), {}, []
     posing = {rig: twins[rig] for rig in above_field(source) if rig in twins}
@@ -77,7 +79,8 @@ def fitted(context, source, item, body):
         raise UserError("Modifiers of {name} change its vertices; it is not copied", item)
     world = world_matrices(item, (), depsgraph_of(context), under=above_field(source))
     with modifier_stack.evaluated_mesh(context, item, in_place=True) as mesh:
-        rest, triangles = transform(world.rest, mesh_arrays.positions(mesh)), mesh_arrays.triangles(mesh)
+        rest = transform(world.rest, mesh_arrays.positions(mesh))
+        triangles = facing(mesh_arrays.triangles(mesh), world.rest)
     if modifier_stack.find(item) is None:
         raise UserError("The field does not move {name}; wrap again", item)
     with modifier_stack.moved_mesh(context, item) as mesh:

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..core.errors import UserError
+from ..core.geometry.spaces import facing, mirrors
 from ..names import OFFSETS, TURNS
 from . import keys
 
@@ -105,3 +106,8 @@ class Given:
             for one in layers
             if one.domain in ("POINT", "CORNER") and one.name not in kept and not one.name.startswith(".")
         ]
+
+    def mirror(self, matrix):
+        """(3, 3) for the shape at rest, so that no mirror lies on the way; triangles face out after it."""
+        self.triangles, self.corners = (facing(one, matrix) for one in (self.triangles, self.corners))
+        return np.diag([-1.0 if mirrors(matrix) else 1.0, 1.0, 1.0])

@@ -10,7 +10,7 @@ from mathutils import Matrix
 from ..blender import mesh_arrays
 from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..core.errors import UserError, refuse
-from ..core.geometry.spaces import inverse, transform
+from ..core.geometry.spaces import facing, inverse, transform
 from ..handles.empties import make_empty, matrix_of
 from ..handles.palette import free_colour
 from ..pin_tool import places
@@ -35,10 +35,9 @@ def read_target(context, target, space):
     mesh = mesh_arrays.read(context, target)
     refuse(mesh_arrays.nothing_in(target.name, len(mesh.vertices), len(mesh.triangles)))
     to_solve = space.world_to_solve @ matrix_of(target)
-    mirrored = np.linalg.det(to_solve[:3, :3]) < 0
-    vertices, triangles = transform(to_solve, mesh.vertices), mesh.triangles
-    refuse(mesh_arrays.flat(target.name, vertices, triangles))
-    return vertices, triangles[:, ::-1] if mirrored else triangles
+    vertices = transform(to_solve, mesh.vertices)
+    refuse(mesh_arrays.flat(target.name, vertices, mesh.triangles))
+    return vertices, facing(mesh.triangles, to_solve)
 
 
 def refusal(source):

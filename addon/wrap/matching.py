@@ -56,6 +56,11 @@ class Wrapped:
         wrap.shown_keys, wrap.target_mark = self.shown_keys, self.mark if wrap.onto == target else ""
 
 
+def beside(source, target):
+    """(4, 4) from the coordinates of a source to those of its target."""
+    return np.linalg.inv(matrix_of(target)) @ matrix_of(source)
+
+
 def distance(points, surface):
     """How far from a surface half of the points are at most."""
     return np.median(np.abs(surface(points[:: -(-len(points) // LOOKED_AT)])))
@@ -68,6 +73,7 @@ class Match:
         self.ends = ObjectReference(source), ObjectReference(target)
         self.given = Given(context, source)
         self.moved = self.moved_beside(source, target)
+        self.mirror = self.given.mirror(beside(source, target))
         self.triangles, self.mark = mesh_arrays.triangles(target.data), mark_of(target)
         wrap = settings_of(source).wrap
         self.is_edited = target == wrap.onto and wrap.target_mark not in ("", self.mark)
@@ -97,7 +103,7 @@ class Match:
 
     def moved_beside(self, source, target):
         """(n, 3) vertices of the wrapped source in the target's coordinates, as keys are."""
-        return transform(np.linalg.inv(matrix_of(target)) @ matrix_of(source), self.given.moved)
+        return transform(beside(source, target), self.given.moved)
 
     def met(self, wrapped):
         """The target's vertices as they were wrapped onto: a pose may have come after the wrap.
@@ -131,12 +137,12 @@ class Match:
 
     def places_of(self, vertices, triangles, task=None):
         """Where the vertices of a mesh lie on the wrapped source."""
-        rest = self.given.rest, self.given.triangles
+        rest = self.given.rest @ self.mirror, self.given.triangles
         return native.library().Correspondence(self.moved, rest, (vertices, triangles), task=task)
 
     def carried(self, task):
         """(k, m, 3) of the source's keys: what poses the target poses these too."""
-        carried = self.places.displacements(self.offsets, task=task)
+        carried = self.places.displacements(self.offsets @ self.mirror, task=task)
         if np.abs(self.own - self.unposed).max() <= LEAST_POSE * np.ptp(self.own, axis=0).max():
             return carried
         posed, unposed = (self.own, self.triangles), (self.unposed, self.triangles)

@@ -9,7 +9,7 @@ import bpy
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.property_definitions import path_text
 from ..core.errors import UserError
-from ..core.geometry.spaces import transform
+from ..core.geometry.spaces import facing, transform
 from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..deform.solve_job import describe
@@ -31,7 +31,8 @@ def upright(context, item):
     """(vertices, triangles) of an object as shown in the world, with y up."""
     with modifier_stack.mesh_of(context, item, list(item.modifiers)) as mesh:
         mesh = mesh_arrays.arrays_of(item, mesh)
-    return transform(matrix_of(item), mesh.vertices)[:, [0, 2, 1]] * [1, 1, -1], mesh.triangles
+    world = matrix_of(item)
+    return transform(world, mesh.vertices)[:, [0, 2, 1]] * [1, 1, -1], facing(mesh.triangles, world)
 
 
 class ARAPFIELDS_OT_wrap_sheet(JobOperator, bpy.types.Operator):

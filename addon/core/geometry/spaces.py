@@ -78,6 +78,16 @@ def transform(matrix, points):
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
+def mirrors(matrix):
+    """Whether a 4×4 affine matrix turns left into right."""
+    return bool(np.linalg.det(matrix[:3, :3]) < 0.0)
+
+
+def facing(triangles, matrix):
+    """(m, 3) triangles that face the same way after a matrix has moved them, which may mirror."""
+    return triangles[:, ::-1] if mirrors(matrix) else triangles
+
+
 def inverse(matrix):
     """The inverse of a 4×4 affine matrix; LinAlgError where it has none.
 
