@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Armatures that a target has of its own, and what reads them: drivers, modifiers, constraints."""
 
+import bpy
+
 from ..blender.object_references import settings_of
 
 
@@ -46,7 +48,16 @@ def copy_drivers(source, target):
         for variable in made.driver.variables:
             for read in variable.targets:
                 if own.get(read.id) is not None:
+                    copy_property(read.id, own[read.id], read.data_path)
                     read.id = own[read.id]
+
+
+def copy_property(given, there, path):
+    """What a driver reads of a twin, where that is a custom property that the twin lacks."""
+    name = bpy.utils.unescape_identifier(path[2:-2]) if path.startswith('["') else ""
+    if name in given and name not in there:
+        there[name] = given[name]
+        there.id_properties_ui(name).update_from(given.id_properties_ui(name))
 
 
 def retarget(item, own):

@@ -8,7 +8,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.wraps import SMALL, bar_and_target
+    from support.blender.wraps import SMALL, bar_and_target, rigged_bar, soup_of
 
     from addon.blender import mesh_arrays
 
@@ -161,3 +161,38 @@ def test_a_locked_key_of_the_target_stays_as_it_was_sculpted():
     assert bpy.ops.arapfields.transfer() == {"FINISHED"}
     assert np.array_equal(mesh_arrays.vectors(up.data, "co"), sculpted.astype(np.float32))
     assert np.abs(offsets(target, "Above") - offset).max() < SINGLE
+
+
+def driven(item, name, read, path):
+    """A key that a property moves, by a driver."""
+    block = shifted(item, name, (0, 0, 0.1))
+    driver = block.driver_add("value").driver
+    driver.expression = "var"
+    variable = driver.variables.new()
+    variable.targets[0].id_type = read.id_type
+    variable.targets[0].id, variable.targets[0].data_path = read, path
+
+
+def test_drivers_read_properties_of_the_target_and_its_armature():
+    item, rig = rigged_bar()
+    item["fat"], item.data["thin"], rig["arm"], rig.data["leg"] = 0.5, 0.25, 0.125, 0.75
+    item.id_properties_ui("fat").update(max=3.0)
+    for read, name in ((item, "fat"), (item.data, "thin"), (rig, "arm"), (rig.data, "leg")):
+        driven(item, name, read, f'["{name}"]')
+    driven(item, "place", item, "location.x")
+    target = item.arapfields.wrap.onto = soup_of(item)
+    assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    twin = bpy.data.objects["Rig Soup"]
+    target["fat"], target.data["thin"], twin["arm"], twin.data["leg"] = 0.1, 0.2, 0.3, 0.4
+    assert target.id_properties_ui("fat").as_dict()["max"] == 3.0
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}  # again: the target's own values stay
+    for one in (target, target.data, twin, twin.data, rig, rig.data):
+        one.update_tag()
+    bpy.context.view_layer.update()
+    values = {block.name: block.value for block in target.data.shape_keys.key_blocks}
+    wanted = {"fat": 0.1, "thin": 0.2, "arm": 0.3, "leg": 0.4, "place": 0.0}
+    assert {name: values[name] for name in wanted} == pytest.approx(wanted)
+    values = {block.name: block.value for block in item.data.shape_keys.key_blocks}
+    wanted = {"fat": 0.5, "thin": 0.25, "arm": 0.125, "leg": 0.75}
+    assert {name: values[name] for name in wanted} == pytest.approx(wanted)
