@@ -8,11 +8,11 @@
 namespace arapfields {
 namespace {
 
-/// Curvature of all but the planes, as a share of what a Newton step has.
+/// Least curvature of the quadratic model of the other terms, as a fraction of −slope.
 constexpr double least_curvature = 0.1;
-/// Steps of Newton's method, which stay within an interval.
+/// Most iterations of the safeguarded Newton method (bisection where it leaves the bracket).
 constexpr int line_steps = 8;
-/// Share of a step that Newton's method leaves.
+/// Its tolerance on the step length.
 constexpr double line_rest = 1e-9;
 
 }  // namespace
@@ -48,7 +48,7 @@ double contact_step(const std::vector<ContactPlane>& planes, double stiffness, c
                     const Scalar* ways, double slope) {
   struct Meeting {
     double pressed;  // pressure − stiffness·gap
-    double rate;     // of its growth along the step
+    double rate;     // its derivative along the step
     double share;
   };
   std::vector<Meeting> meetings;
@@ -58,7 +58,7 @@ double contact_step(const std::vector<ContactPlane>& planes, double stiffness, c
     const double rate = -stiffness * (plane.gap(ways) + plane.offset);
     if (pressed > 0.0 || pressed + rate > 0.0) meetings.push_back({pressed, rate, plane.share});
   }
-  const auto at = [&](double t) {  // slope and curvature of the planes
+  const auto at = [&](double t) {  // first and second derivative of the planes' energy at t
     double first = 0.0, second = 0.0;
     for (const Meeting& m : meetings) {
       const double pressed = m.pressed + t * m.rate;

@@ -11,28 +11,28 @@
 
 namespace arapfields {
 
-/// A solid that a surface stays outside of, at this distance of mesh units. A function that is not
-/// continuous, such as the distance from an open mesh, is a sheet that nothing passes.
+/// A solid {Φ < 0} from which a surface keeps the distance `margin`, in mesh units. A discontinuous function,
+/// such as the signed distance to an open mesh, is a sheet with two sides, which the surface does not cross.
 struct Obstacle {
   std::shared_ptr<const ImplicitFunction> function;
   double margin = 0.0;
-  Mat4 placement = Mat4::Identity();  ///< of the function's space: turns, moves, and scales evenly
+  Mat4 placement = Mat4::Identity();  ///< a similarity, from the function's to mesh coordinates
 };
 
-/// All that is below a height along `up`, in mesh coordinates.
+/// The half-space below a height along `up`, in mesh coordinates, as an obstacle.
 struct Ground {
   double height = 0.0;
   Vec3 up = Vec3::UnitZ();
   bool operator==(const Ground&) const = default;
 };
 
-/// What a surface does not pass.
+/// The contact constraints of a solve.
 struct Contact {
   std::vector<Obstacle> obstacles;
   std::optional<double> ground;  ///< height along `up`, in mesh coordinates; none: no ground
   Vec3 up = Vec3::UnitZ();
   double friction = 0.5;  ///< Coulomb's coefficient at obstacles and the ground, in secondary motion alone
-  bool itself = false;    ///< its own parts, but for what touches or overlaps at rest
+  bool itself = false;    ///< self-contact, except of parts that touch or overlap at rest
   bool any() const { return !obstacles.empty() || ground || itself; }
 };
 
@@ -43,17 +43,17 @@ struct HeldBack {
   double distance;  ///< mean distance to the target, mesh units
 };
 
-/// How a surface touches, after a solve.
+/// The contact state of a surface after a solve.
 struct ContactReport {
-  double deepest = 0.0;    ///< how far a sample is beyond a margin, mesh units
-  double touching = 0.0;   ///< share of the area that presses
-  bool unsettled = false;  ///< more steps would bring it out
+  double deepest = 0.0;    ///< greatest penetration depth beyond a margin, mesh units
+  double touching = 0.0;   ///< fraction of the area in contact (with positive pressure)
+  bool unsettled = false;  ///< the depth is above the tolerance: more iterations reduce it
   std::vector<HeldBack> held;
-  /// Names of the obstacles that cross the surface where it began: what lies inside of them stays there.
+  /// Names of the obstacles that cross the surface at the start: samples inside them are not pushed out.
   std::vector<std::string> crossing;
 };
 
-/// Sentences that say which handles are held back by what, and what crosses the surface.
+/// One sentence for each handle that is held back, and for each obstacle that crosses the surface.
 std::vector<std::string> notes_on(const ContactReport& report);
 
 /// Throws InvalidInput for null functions and for numbers that are negative or not finite.

@@ -11,13 +11,13 @@
 namespace arapfields {
 namespace {
 
-/// A way that has come so near, in cube units, has met the surface; evaluations along a way, of which one
-/// along a surface needs many.
+/// Distance, in cube units, at which sphere tracing reports a hit, and its most steps: a segment that grazes
+/// a surface needs many.
 constexpr double met = 2e-4;
 constexpr int most_evaluations = 150;
-/// Slopes of functions below this say nothing of distances.
+/// Gradient norms are clamped to at least this where they divide.
 constexpr double least_slope = 1e-3;
-/// How far a placement may be from an even scale.
+/// Relative tolerance of a placement's uniform scale.
 constexpr double even = 1e-5;
 
 }  // namespace
@@ -99,8 +99,9 @@ BarrierSurface BarrierSurface::ground(const Ground& ground, const Frame& frame) 
   return result;
 }
 
-/// The points in the function's cube. A fit says nothing beyond it: those points are brought to its border,
-/// `beyond` gets their distances to it and `outward` the directions.
+/// Points in the coordinates of the function's cube. A fitted function is defined inside the cube alone:
+/// points outside are projected onto its boundary, `beyond` gets their distances to it (0 inside), and
+/// `outward`, if not null, the offsets.
 PointsF BarrierSurface::in_function(PointsIn points, Vector& beyond, Points* outward) const {
   const Points own =
       (points * back_.topLeftCorner<3, 3>().transpose()).rowwise() + back_.topRightCorner<3, 1>().transpose();
@@ -149,7 +150,7 @@ BarrierSurface::Nearest BarrierSurface::nearest(PointsIn points) const {
   return result;
 }
 
-/// Steps as long as nothing can be near (Hart, Sphere tracing, 1996).
+/// Sphere tracing (Hart 1996).
 std::vector<BarrierSurface::Hit> BarrierSurface::first_hits(PointsIn from, PointsIn to) const {
   std::vector<Hit> hits(static_cast<std::size_t>(from.rows()));
   std::vector<Index> on_the_way, met_rows;

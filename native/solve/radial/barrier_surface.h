@@ -6,49 +6,50 @@
 
 namespace arapfields {
 
-/// An obstacle, or the ground, in the cube coordinates of the surface that meets it.
+/// The signed distance of an obstacle, or of the ground, in the cube coordinates of the deforming surface:
+/// that of the obstacle's implicit function, placed by a similarity.
 class BarrierSurface {
  public:
   BarrierSurface(const Obstacle& obstacle, const Frame& frame);
   static BarrierSurface ground(const Ground& ground, const Frame& frame);
 
   struct Nearest {
-    Vector distances;  ///< (n) negative inside; about true ones where the function is no distance
-    Points normals;    ///< (n,3) unit length, outwards
+    Vector distances;  ///< (n) negative inside; to first order, Φ/‖∇Φ‖, if Φ is no distance
+    Points normals;    ///< (n,3) unit gradients of the distance
   };
-  /// Where the function's space lies, in the surface's cube.
+  /// The similarity from the function's cube to the surface's.
   const Mat4& placement() const { return place_; }
   void set_placement(const Mat4& placement);
-  /// A share of the way between two placements.
+  /// Interpolates two placements at the parameter `share` in [0, 1].
   void place_between(const Mat4& from, const Mat4& to, double share);
-  /// Whether both have the same function, wherever it lies.
+  /// Whether both have the same function, whatever their placements.
   bool is_alike(const BarrierSurface& other) const { return function_ == other.function_; }
   Vector distances(PointsIn points) const;
   Nearest nearest(PointsIn points) const;
-  /// Whether it has no inside: what counts is which side one comes from.
+  /// Whether it is a sheet without an inside: its distances are unsigned, its normals point to the near side.
   bool is_sheet() const { return sheet_; }
-  /// Whether it has no edge.
+  /// Whether it is the ground plane.
   bool is_flat() const { return function_ == nullptr; }
   double margin() const { return margin_; }
 
   struct Hit {
-    double share = 2.0;  ///< of the way; above 1: free
+    double share = 2.0;  ///< parameter along the segment; above 1: no hit
     Vec3 place;
-    Vec3 normal;  ///< towards where the way began
+    Vec3 normal;  ///< unit, towards the segment's start
   };
-  /// Where straight ways first meet the surface, from places outside.
+  /// First intersections of segments with the surface, from points outside it.
   std::vector<Hit> first_hits(PointsIn from, PointsIn to) const;
 
  private:
   BarrierSurface() = default;
   PointsF in_function(PointsIn points, Vector& beyond, Points* outward) const;
 
-  std::shared_ptr<const ImplicitFunction> function_;  // null: the plane
+  std::shared_ptr<const ImplicitFunction> function_;  // null: the ground
   Frame own_;                                         // of the function
   Mat4 place_ = Mat4::Identity();
-  Mat3 turn_ = Mat3::Identity();  // of the function's directions
-  Mat4 back_ = Mat4::Identity();  // of the surface's cube into the function's
-  double unit_ = 1.0;             // of the function's cube, in the surface's
+  Mat3 turn_ = Mat3::Identity();  // rotation of place_
+  Mat4 back_ = Mat4::Identity();  // inverse of place_
+  double unit_ = 1.0;             // scale of place_
   bool sheet_ = false;
   bool is_distance_ = true;
   double margin_ = 0.0;  // cube units

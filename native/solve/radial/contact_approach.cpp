@@ -14,25 +14,25 @@
 namespace arapfields {
 namespace {
 
-/// How far an obstacle moves in a step, in cube units.
+/// Longest motion of an obstacle in a step, in cube units.
 constexpr double obstacle_step = 0.02;
-/// Quasi-Newton steps between two searches for planes, and the fewest that a round counts for.
+/// Quasi-Newton iterations between two searches for contact planes, and the fewest a round is charged for.
 constexpr Index steps_between = 6, least_at_once = 2;
-/// Solves of so many iterations whose handles or obstacles come from far go on to their end, where rounding
-/// changes less: so many quasi-Newton steps each time, until a round moves no sample
-/// farther, in cube units. Not where the surface meets itself: handles that meet would stop each other.
+/// Solves of at least `patient` iterations that take several steps run to convergence, so that rounding
+/// changes the result less: rounds of `steps_to_the_end` iterations, until a round moves no sample by more
+/// than `at_rest`, in cube units. Not with self-contact: handles that meet would block each other.
 constexpr Index patient = 30, steps_to_the_end = 20;
 constexpr double at_rest = 1e-3;
-/// Pushes at the end, while something is deep but nearly out.
+/// Projections at the end, while the penetration depth is between ContactSet::deep and `nearly`.
 constexpr int most_pushes = 6;
-/// Rounds beyond the iterations that were asked for, while something is deep; of the shape itself, only
-/// while that falls.
+/// Rounds beyond the requested iterations while points penetrate; with self-contact alone, only while the
+/// depth decreases.
 constexpr Index more_rounds = 4;
-/// Depths fall where a round leaves no more than this share. Planes become stiffer where they do not.
+/// A depth decreases if a round leaves at most this fraction of it; otherwise the stiffness is raised.
 constexpr double still_comes_out = 0.8;
-/// A round that ends too deep is taken back by halves, so many times at most.
+/// A round that ends too deep is rejected, and its step halved at most so many times.
 constexpr int most_halves = 4;
-/// What single precision cannot see of an energy.
+/// Relative change of the energy below the resolution of single precision.
 constexpr double floor = 1e-10;
 constexpr double deep = ContactSet::deep;
 
@@ -44,8 +44,8 @@ bool ContactApproach::goes_to_its_end() const {
   return iterations_ >= patient && !state_.in_one_go && !state_.contact.itself();
 }
 
-/// Finds the planes near the surface, and brings it beyond them as long as it is deep, but no deeper than
-/// `from`.
+/// Finds the contact planes near the surface, and projects it out of them at most `pushes` times, while the
+/// penetration depth is above ContactSet::deep, below `from`, and decreases.
 void ContactApproach::find_and_push(int pushes, double from) {
   RadialState& s = state_;
   double depth = s.contact.find(s.shape.coefficients);
@@ -68,8 +68,8 @@ void ContactApproach::find_and_push(int pushes, double from) {
   }
 }
 
-/// Descends, and updates the pressures. Whether the descent converged. Goes back towards `before` where that
-/// meets what was not near there.
+/// Minimises with fixed contact planes, updates the pressures (augmented-Lagrangian multipliers), and finds
+/// new planes. Halves the step from `before` while it penetrates too deeply. Returns whether it converged.
 bool ContactApproach::solve_round(const RowMatrix<double>& before, Index iterations) {
   RadialState& s = state_;
   stiffen_contact(s);
@@ -112,7 +112,7 @@ void ContactApproach::approach(const std::vector<Mat4>& motions, double way, con
   approach_by(motions, std::clamp<Index>(steps, 1, pace.most_steps), pace.iterations);
 }
 
-/// In so many steps, with `on_the_way` iterations in all but the last.
+/// In `steps` equal steps, with `on_the_way` iterations in all but the last.
 void ContactApproach::approach_by(const std::vector<Mat4>& motions, Index steps, Index on_the_way) {
   RadialState& s = state_;
   s.precondition(0.0);
@@ -134,8 +134,9 @@ void ContactApproach::approach_by(const std::vector<Mat4>& motions, Index steps,
   s.history.start.set(s.start_revisions(), std::move(start));
 }
 
-/// Solves in rounds until it converges with nothing deep, or until the iterations run out and depths fall no
-/// more. A `start`, if not null, is a drag's, which goes on as it went.
+/// Solves in rounds until it converges without penetration, or until the iterations run out and the depth
+/// stops decreasing. With a `start`, the first round extrapolates the last change of a drag, and stores there
+/// where it would have started.
 void ContactApproach::solve_to_targets(const std::vector<Mat4>& motions, bool to_its_end,
                                        SolveHistory::Start* start) {
   RadialState& s = state_;

@@ -7,29 +7,31 @@
 
 namespace arapfields {
 
-/// Takes handles and obstacles to where they belong, in steps that no sample jumps through anything by.
+/// Continuation for a solve in contact: moves handles to their targets and obstacles to their placements in
+/// steps so small that no sample tunnels through a surface, with a few quasi-Newton iterations after each.
 class ContactApproach {
  public:
   struct Pace {
-    double length;         ///< how far a target moves in a step, in cube units
-    double length_itself;  ///< the same where the surface meets itself
+    double length;         ///< longest motion of a handle's target in a step, in cube units
+    double length_itself;  ///< the same with self-contact
     Index most_steps;
-    Index iterations;  ///< quasi-Newton steps in each but the last
+    Index iterations;  ///< quasi-Newton iterations in each step but the last
   };
   static constexpr Pace usual{0.15, 0.06, 24, 3};
-  /// For where usual steps have little to go by.
+  /// For a second try from the same start, where the usual steps may choose the wrong side.
   static constexpr Pace small{0.04, 0.03, 60, 10};
-  /// What is so deep beyond a margin, in cube units, did not come there by steps.
+  /// Penetration depth beyond a margin, in cube units, above which a step is rejected and shortened.
   static constexpr double too_deep = 0.03;
-  /// What is deeper than that, in cube units, is still on its way out.
+  /// Penetration depth, in cube units, up to which the final projections push points out.
   static constexpr double nearly = 0.01;
 
   ContactApproach(RadialState& state, Index iterations, double tolerance, const Progress& progress)
       : state_(state), iterations_(iterations), tolerance_(tolerance), progress_(progress) {}
 
-  /// Takes obstacles that have moved to where they are now, and the surface along. Handles stay at `motions`.
+  /// Moves the obstacles from their last placements to the current ones, and the surface out of their way.
+  /// The handles stay at `motions`.
   void sweep(const std::vector<Mat4>& motions);
-  /// Takes the handles from `motions` to their targets, which are at most this `way` off.
+  /// Moves the handles from `motions` to their targets; `way` is the longest distance, in cube units.
   void approach(const std::vector<Mat4>& motions, double way, const Pace& pace);
   /// The same in one step.
   void approach_at_once(const std::vector<Mat4>& motions) { approach_by(motions, 1, 0); }
@@ -46,7 +48,7 @@ class ContactApproach {
   Index iterations_;
   double tolerance_;
   const Progress& progress_;
-  bool swept_ = false;  // obstacles came from far
+  bool swept_ = false;  // the last sweep took more than one step
 };
 
 }  // namespace arapfields

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where an obstacle crosses a surface, its nearest sides lie opposite each other, and nothing says which one
-// the surface comes from.
+// Initial intersections of an obstacle with the surface. There the nearest points on the obstacle lie on
+// opposite sides for neighbouring samples, and no side is known to be the right one.
 #include <algorithm>
 #include <utility>
 
@@ -11,15 +11,16 @@
 namespace arapfields {
 namespace {
 
-/// The cosine of normals that lie opposite each other.
+/// Largest cosine of normals that count as opposite.
 constexpr double opposite = -0.5;
-/// Samples are beside each other that lie no farther apart at rest, in spacings.
+/// Largest distance of neighbours at rest, in sample spacings.
 constexpr double nearby = 3.0;
-/// A part of a surface has one side where its mean normal is as long; along it ways out lead whose cosine is
-/// at least `along` somewhere, and nowhere beyond `against` on the other side.
+/// A patch can be pushed out as a whole if its mean normal is at least `one_sided` long, and the cosines of
+/// the obstacle's normals with it are somewhere above `along` and nowhere below `against`, or so with both
+/// signs reversed.
 constexpr double one_sided = 0.5, along = 0.7, against = -0.2;
 
-/// Whether the ways out lead all to one side of the surface, so that it comes out whole.
+/// Whether the obstacle's normals (n,3) push a patch with these rest normals to one side of it as a whole.
 bool comes_out(PointsIn ways_out, PointsIn normals) {
   const Vec3 mean = normals.colwise().mean();
   if (mean.norm() < one_sided) return false;
@@ -28,14 +29,14 @@ bool comes_out(PointsIn ways_out, PointsIn normals) {
          (cosines.maxCoeff() < -against && cosines.minCoeff() < -along);
 }
 
-/// Samples beside an obstacle, where it may cross their surface. Rows count these alone.
+/// Samples near an obstacle, and the search for those that it crosses. Rows index these samples alone.
 class SamplesBeside {
  public:
-  /// `places` are those of all samples, `distances` theirs from the obstacle.
+  /// `places` (n,3) are the positions of all samples, `distances` (n) their signed distances to the obstacle.
   SamplesBeside(const BarrierSurface& obstacle, const ContactPoints& points, PointsIn places,
                 const Vector& distances);
-  /// Those that lie inside where the obstacle crosses the surface, with all that are inside beside them, and
-  /// those outside, between which and their neighbours it crosses.
+  /// Samples to be left where they are: connected patches inside the obstacle that it crosses, their outside
+  /// neighbours, and outside neighbours of each other with the obstacle in between.
   std::vector<Index> crossed();
 
  private:
@@ -58,10 +59,10 @@ class SamplesBeside {
   Points rest_;
   Vector distances_;
   Points ways_out_;
-  PointGrid grid_;  // at rest
+  PointGrid grid_;  // of the rest positions
   std::vector<Index> cells_;
-  std::vector<bool> left_;  // inside
-  std::vector<bool> seen_;  // as inside
+  std::vector<bool> left_;  // the result of crossed()
+  std::vector<bool> seen_;  // rows of patches that were visited
 };
 
 std::vector<Index> SamplesBeside::nearer(const Vector& distances, double reach) {
@@ -86,7 +87,7 @@ SamplesBeside::SamplesBeside(const BarrierSurface& obstacle, const ContactPoints
       left_(samples_.size()),
       seen_(samples_.size()) {}
 
-/// Calls take(other) for the rows beside a row at rest.
+/// Calls take(other) for the neighbours of a row at rest.
 template <class Take>
 void SamplesBeside::each_neighbour(Index row, Take&& take) const {
   grid_.near(cells_[static_cast<std::size_t>(row)], [&](Index cell) {
@@ -95,7 +96,8 @@ void SamplesBeside::each_neighbour(Index row, Take&& take) const {
   });
 }
 
-/// Leaves all that is inside beside a row, and what is outside there, unless it comes out whole.
+/// Marks the connected patch of inside samples around a row, and its outside neighbours, unless the patch can
+/// be pushed out as a whole.
 void SamplesBeside::leave_part(Index row) {
   std::vector<Index> part{row}, samples, edge;
   seen_[static_cast<std::size_t>(row)] = true;
@@ -113,7 +115,7 @@ void SamplesBeside::leave_part(Index row) {
     for (const Index each : *rows) leave(each);
 }
 
-/// Leaves pairs of rows with the obstacle in between.
+/// Marks pairs of rows (from_k, to_k) with the obstacle in between.
 void SamplesBeside::leave_between(const std::vector<Index>& from, const std::vector<Index>& to) {
   const std::vector<BarrierSurface::Hit> hits =
       obstacle_.first_hits(rows_of(places_, from), rows_of(places_, to));
@@ -125,7 +127,7 @@ void SamplesBeside::leave_between(const std::vector<Index>& from, const std::vec
 }
 
 std::vector<Index> SamplesBeside::crossed() {
-  std::vector<Index> from, to;  // outside, on opposite sides
+  std::vector<Index> from, to;  // pairs outside, on opposite sides
   const Index count = std::ssize(samples_);
   for (Index row = 0; row < count; ++row)
     each_neighbour(row, [&](Index other) {

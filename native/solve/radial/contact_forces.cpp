@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How hard planes press, and the least motion that brings a surface out, by the quasi-Newton model.
+// Contact pressures, and the projection out of obstacles in the metric of the quasi-Newton model.
 #include "solve/radial/contact_forces.h"
 
 #include <algorithm>
@@ -11,22 +11,23 @@
 namespace arapfields {
 namespace {
 
-/// Sweeps that scale the pressures of several surfaces.
+/// Gauss–Seidel sweeps for the factors of the surfaces' pressures.
 constexpr int scalings = 20;
-/// The cosine of normals of one group.
+/// Planes whose normals have at least this cosine count as parallel.
 constexpr double alike = 0.9;
-/// Planes that a search for a way out takes in at once, how often, and how far apart they are, in cube units.
+/// A projection adds at most `planes_at_once` constraints in each of `searches` rounds; parallel ones are at
+/// least `apart` from each other at rest, in cube units.
 constexpr Index planes_at_once = 60;
 constexpr int searches = 5;
 constexpr double apart = 0.02;
-/// A way out is at most so many times as long as the deepest place is deep.
+/// A projection moves no point farther than this times the greatest penetration depth.
 constexpr double farther = 3.0;
-/// Steps in time leave nothing deeper beyond a margin, in cube units.
+/// Penetration depth beyond a margin that a time step may leave, in cube units.
 constexpr double deep_in_motion = 3.0 * ContactSet::deep;
-/// What may be left of a gap, in cube units.
+/// Tolerance of the projection's gaps, in cube units.
 constexpr double slight = 1e-4;
 
-/// Of the planes whose gaps are below zero the deepest, apart from each other.
+/// Indices of the planes with the most negative gaps, without near and parallel ones.
 std::vector<Index> deepest_of(const Vector& gaps, const ContactSet& set) {
   std::vector<Index> order;
   for (Index i = 0; i < gaps.size(); ++i)
@@ -91,7 +92,7 @@ void press_balanced(RadialState& s) {
   const RadialObjective<float>& objective = *s.fast.objective.latest();
   const TallMatrix<float>& inverse_factor = s.preconditioner.inverse_factor.latest();
   const Points places = contact_places(s);
-  // What all other forces and those of each surface do, in the norm of the quasi-Newton model.
+  // L⁻¹ times the gradient of all other terms, and of each surface's contact term.
   const auto half = [&](const RowMatrix<double>& gradient) {
     const PointsF result = inverse_factor.times(gradient.cast<float>());
     return Vector(Eigen::Map<const VectorF>(result.data(), result.size()).cast<double>());
@@ -151,7 +152,7 @@ void push_out(RadialState& s) {
     if (s.problem.mirror) s.problem.mirror->symmetrise(next);
     objective.measure_contact(s.shape.coefficients + next, u);
     const Points places = objective.contact_values(u).cast<double>();
-    if ((places - before).rowwise().norm().maxCoeff() > longest) break;  // planes that contradict each other
+    if ((places - before).rowwise().norm().maxCoeff() > longest) break;  // the planes are incompatible
     step = std::move(next);
     left = gaps_of(set, places);
   }

@@ -5,20 +5,22 @@
 
 namespace arapfields {
 
-/// Where the places of the planes that were found are now.
+/// Current positions (n,3) of the contact set's points.
 Points contact_places(RadialState& state);
-/// The least motion, in the norm of the quasi-Newton model, that brings the surface beyond the planes that
-/// were found.
+/// Projects the shape onto the feasible side of the contact planes: the least step in the norm of the
+/// quasi-Newton model's Hessian.
 void push_out(RadialState& state);
-/// The preconditioner feels the planes that press on the current shape.
+/// Adds the Hessian of the active contact planes to the preconditioner.
 void stiffen_contact(RadialState& state);
-/// Updates the pressures by the depths. Returns how much of them has changed, 0 to 1.
+/// Augmented-Lagrangian update of the pressures (multipliers) by the gaps. Returns their relative change, 0
+/// to 1.
 double press_contact(RadialState& state);
-/// The same, scaled for each surface to what balances all other forces: before a descent has ended, depths
-/// say little about forces.
+/// The same, with each surface's pressures scaled by a factor in [0, 1] that best balances all other forces:
+/// before a descent has converged, gaps times stiffness are no forces.
 void press_balanced(RadialState& state);
+/// Whether any plane is active: its updated pressure would be above 0.
 bool would_press(RadialState& state);
-/// Whether a place is deeper than steps in time leave it.
+/// Whether a point penetrates deeper than a time step may leave it.
 bool is_deep(RadialState& state);
 
 }  // namespace arapfields

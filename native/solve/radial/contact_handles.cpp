@@ -10,10 +10,10 @@
 namespace arapfields {
 namespace {
 
-/// What the shape itself holds back is pulled by no more than from so far, in cube units: neighbours, held
-/// back in unlike ways, would squash what is between them.
+/// Root mean square distance, in cube units, of a handle that self-contact holds back from its target:
+/// neighbouring handles that are held back by different amounts would squash the shape between them.
 constexpr double longest_pull = 0.01;
-/// Handles farther from their targets against a force, in cube units, are held back.
+/// Mean distance of a handle from its target, in cube units, above which it is reported as held back.
 constexpr double held_back = 0.02;
 
 }  // namespace
@@ -52,7 +52,7 @@ void set_reachable_targets(RadialState& s, std::vector<Mat4> motions, bool gentl
 
 std::vector<HeldBack> held_back_handles(RadialState& s) {
   std::vector<HeldBack> result;
-  const RadialObjective<float>& objective = s.objective(s.fast);  // of the planes that were found last
+  const RadialObjective<float>& objective = s.objective(s.fast);  // with the planes of the last search
   const Points places = contact_places(s);
   const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();
   const Points& targets = s.handles.pairs().targets;

@@ -7,13 +7,13 @@
 
 namespace arapfields {
 
-/// Takes motions of the handles back, each by the least translation after which all that the handle holds is
-/// beyond the planes that were found. Returns which surface asks for the most of it; −1: none.
+/// Adds to each handle's motion the least translation that brings the points it holds to the feasible side of
+/// the contact planes. Returns for each handle the surface with the largest multiplier; −1: none.
 std::vector<Index> hold_back(RadialState& state, std::vector<Mat4>& motions);
-/// The handles pull towards where these motions take them, as far as contact lets them; `gently`: what the
-/// shape itself holds back does not pull from far.
+/// Sets the targets of the handles' springs to `motions`, held back by contact. `gently`: a handle that
+/// self-contact holds back gets a target near its current position instead.
 void set_reachable_targets(RadialState& state, std::vector<Mat4> motions, bool gently = true);
-/// Which handles are kept from their targets, and by which surface.
+/// The handles that contact keeps from their targets, and the surface that does it.
 std::vector<HeldBack> held_back_handles(RadialState& state);
 
 }  // namespace arapfields

@@ -13,15 +13,16 @@
 namespace arapfields {
 namespace {
 
-/// Finer places at most: of the edges that touch, more would say nothing new.
+/// Most refined points.
 constexpr Index most_finer = 12000;
-/// Finer places lie so many times as dense, and a sample stands for places up to so many spacings away.
+/// Refined points for the area of one sample, and their greatest distance from it, in sample spacings.
 constexpr double finer_density = 12.0, reach = 2.2;
-/// Cosine of the normals of neighbours on one side.
+/// Least cosine between the normals of neighbours on the same side of the surface.
 constexpr double same_side = 0.5;
-/// How far beyond a sharp edge of the shape, in spacings, a finer place may lie.
+/// How far beyond a sharp edge of the shape, in sample spacings, a refined point may lie.
 constexpr double over_edge = 0.05;
-/// Neighbours that a surface of second degree is fitted to, at least.
+/// Fewest neighbours for the fit of a quadratic height field; with fewer, refined points lie in the tangent
+/// plane.
 constexpr Index least_fitted = 5;
 
 }  // namespace
@@ -90,8 +91,8 @@ const std::vector<Index>& ContactPoints::neighbours(Index sample) {
   return found;
 }
 
-/// Places on a spiral in the tangent plane that are nearer to this sample than to others, brought to the
-/// surface of second degree through its neighbours.
+/// Points of a golden-angle spiral in the tangent plane within the sample's Voronoi cell, lifted to the
+/// quadratic height field that fits its neighbours.
 Points ContactPoints::finer(Index sample) {
   const Vec3 at = rest_.row(sample).transpose();
   const auto normal_at = [&](Index i) -> Vec3 {
@@ -116,14 +117,14 @@ Points ContactPoints::finer(Index sample) {
     gram.diagonal().array() += 1e-3 * gram.trace();
     bend = solve_definite(gram, right);
   }
-  std::vector<Index> sides;  // nearby ones of another side
+  std::vector<Index> sides;  // nearby samples beyond a sharp edge
   grid_->near(cells_[static_cast<std::size_t>(sample)], [&](Index cell) {
     for (const Index i : grid_->rows(cell))
       if ((rest_.row(i) - rest_.row(sample)).norm() < 2.0 * reach * spacing_ &&
           normal.dot(normal_at(i)) <= same_side)
         sides.push_back(i);
   });
-  const auto off_the_surface = [&](const Vec3& place) {  // past a sharp edge of it
+  const auto off_the_surface = [&](const Vec3& place) {  // beyond a sharp edge
     return std::any_of(sides.begin(), sides.end(), [&](Index i) {
       const Vec3 arm = place - rest_.row(i).transpose();
       return arm.norm() < reach * spacing_ && arm.dot(normal_at(i)) > over_edge * spacing_;

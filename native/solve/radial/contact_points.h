@@ -10,46 +10,48 @@
 
 namespace arapfields {
 
-/// The places of a surface that are followed: samples, vertices of its mesh that stand out of them, and finer
-/// places around samples that meet an edge, which would poke through between them.
+/// The points of a surface at which contact is enforced: samples, then mesh vertices that stick out of the
+/// samples (sampling/standing_out.h), then refined points around samples at an obstacle's edge, which would
+/// otherwise poke through between samples.
 class ContactPoints {
  public:
   explicit ContactPoints(const RadialProblem& problem) : problem_(problem) {}
-  /// Takes the places of the rest shape, once. Throws Cancelled.
+  /// Takes the samples and vertices of the rest shape, once. Throws Cancelled.
   void choose(const Progress& progress = {});
   bool empty() const { return samples_.empty(); }
-  /// Rows of the problem's samples that are followed.
+  /// Rows of the problem's samples that are contact points.
   const std::vector<Index>& samples() const { return samples_; }
-  /// Of samples, vertices and finer places, in this order.
+  /// Number of samples, vertices and refined points, which are stored in this order.
   Index size() const { return rest_.rows(); }
   Index sample_count() const { return static_cast<Index>(samples_.size()); }
-  /// All but finer places.
+  /// Number of samples and vertices.
   Index coarse_count() const { return coarse_; }
-  /// The sample that a place belongs to.
+  /// The sample itself, or the parent sample of a vertex or refined point.
   Index sample_of(Index row) const;
-  /// The area that a place stands for, as a share of the whole.
+  /// The area weight of a point, as a fraction of the surface's area.
   double share(Index row) const;
   Points rest(const std::vector<Index>& rows) const;
-  /// The same in the basis' embedding; empty without one.
+  /// Rest positions in the basis' interior embedding; empty without one.
   Points embedded(const std::vector<Index>& rows) const;
-  /// Of samples, as they face at rest; zero where that is not known.
+  /// Unit rest normals of samples; zero if the samples have no normals.
   Points normals(const std::vector<Index>& samples) const;
-  /// About the distance of a sample to what it stands for.
+  /// Mean sample spacing: the square root of the area of a sample, in cube units.
   double spacing() const { return spacing_; }
-  /// Samples near one at rest, on the same side.
+  /// Samples near one at rest whose normals are on the same side; the sample itself is the first.
   const std::vector<Index>& neighbours(Index sample);
-  /// Adds finer places around samples that have none yet.
+  /// Adds refined points around samples that have none yet.
   void refine(const std::vector<Index>& samples);
-  /// No finer places.
+  /// Removes all refined points.
   void coarsen();
 
+  /// Positions (size(),3) under the field with these coefficients; cached.
   const Points& at(const RowMatrix<double>& coefficients);
-  /// Whether these were the last ones.
+  /// Whether the cached positions are of these coefficients.
   bool is_at(const RowMatrix<double>& coefficients) const {
     return coefficients.rows() == coefficients_.rows() && coefficients == coefficients_;
   }
-  /// Which way the samples face, as long as the surface is stretched; zero outside of these blocks, if
-  /// not null.
+  /// Deformed normals of the samples, scaled by the local area ratio. With `blocks`, only those of these
+  /// blocks of the evaluator; the others are zero.
   Points normals_at(const RowMatrix<double>& coefficients, const std::vector<Index>* blocks = nullptr);
 
  private:
@@ -58,21 +60,21 @@ class ContactPoints {
 
   const RadialProblem& problem_;
   std::vector<Index> samples_;
-  std::vector<Index> parents_;  // of what is no sample
+  std::vector<Index> parents_;  // the sample of each vertex and refined point
   Index coarse_ = 0;
-  std::vector<bool> is_fine_;  // samples
+  std::vector<bool> is_fine_;  // whether a sample has refined points
   Points rest_;
-  Points embedded_;  // rest_
+  Points embedded_;  // rest_ in the basis' interior embedding
   double spacing_ = 0.0;
-  std::unique_ptr<PointGrid> grid_;  // of the samples
-  std::vector<Index> cells_;         // of each
-  std::vector<std::vector<Index>> near_;
+  std::unique_ptr<PointGrid> grid_;       // of the samples
+  std::vector<Index> cells_;              // the cell of each sample
+  std::vector<std::vector<Index>> near_;  // cached neighbours of each sample
   Revision finer_places_ = 0;
   Dependent<RadialEvaluator<float>, 1> evaluator_;
   Dependent<RadialEvaluator<float>, 1> finer_;
-  RowMatrix<double> coefficients_;  // of the places that were asked for last
+  RowMatrix<double> coefficients_;  // of places_
   Points places_;
-  Dependent<RadialEvaluator<float>, 1> slopes_;  // of the samples
+  Dependent<RadialEvaluator<float>, 1> slopes_;  // first derivatives at the samples
 };
 
 }  // namespace arapfields

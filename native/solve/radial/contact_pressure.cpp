@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How hard a surface presses on the planes that were found.
+// The contact planes' pressures: augmented-Lagrangian multipliers per unit of area.
 #include <algorithm>
 #include <cmath>
 
@@ -8,16 +8,18 @@
 namespace arapfields {
 namespace {
 
-/// Pressures grow by no deeper gaps, in cube units: a solve that has only begun says little of forces.
+/// Penetration depths are clamped to this, in cube units, in multiplier updates: early iterates penetrate by
+/// more than their forces warrant.
 constexpr double shallow = 0.01;
-/// Of stiffness, where depths do not fall, and where they do.
+/// Factors of the stiffness where depths do not decrease and where they do, and its maximum.
 constexpr double harder = 4.0, hardest = 3e6, softer = 0.25;
-/// So far, in cube units, from a plane its mean pressure vanishes: a softer plane keeps what left it away.
+/// Gap, in cube units, at which the mean pressure vanishes at most: the multiplier of a softer plane would
+/// hold off points farther away that have left it.
 constexpr double hover = 2e-3;
-/// Forces farther than this from a handle, in cube units, count less.
+/// Softening length of forces_at()'s weights, in cube units.
 constexpr double handle_reach = 0.2;
 
-/// How much a force at a row of `places` (n,3) counts at a place; 0 for no row.
+/// Weight 1/(d² + handle_reach²) of a force at a row of `places` (n,3), at the distance d; 0 for row −1.
 double nearness(const double* places, Index row, const Vec3& place) {
   if (row < 0) return 0.0;
   const double square = (Eigen::Map<const Vec3>(places + 3 * row) - place).squaredNorm();
@@ -26,7 +28,7 @@ double nearness(const double* places, Index row, const Vec3& place) {
 
 }  // namespace
 
-/// The places of the planes, once each.
+/// Collects the points of the planes, once each, and lets the planes index them.
 void ContactTerms::gather_places() {
   std::vector<Index>& used = found_.rows;
   used.clear();

@@ -10,9 +10,9 @@
 namespace arapfields {
 namespace {
 
-/// Changes of the active set, and sweeps where it does not come to rest.
+/// Most changes of the active set, and Gauss–Seidel sweeps if it has not settled after them.
 constexpr int most_changes = 30, sweeps = 200;
-/// Added to the diagonal, as a share of it: planes that are much alike share their load evenly.
+/// Regularisation of the diagonal, as a fraction of its largest entry: near-parallel planes share their load.
 constexpr double evenly = 1e-4;
 
 }  // namespace
@@ -61,8 +61,8 @@ PointsF ContactRows::pull(const Vector& forces) const {
   return rows.transpose() * (forces.asDiagonal() * normals).cast<float>();
 }
 
-/// The primal–dual active set method (Hintermüller, Ito & Kunisch 2002), and projected Gauss–Seidel sweeps
-/// where that does not end.
+/// The primal–dual active set method (Hintermüller, Ito & Kunisch 2002), then projected Gauss–Seidel if that
+/// does not terminate.
 Vector solve_complementarity(const RowMatrix<double>& lower, const Vector& q) {
   const Index n = q.size();
   RowMatrix<double> m = lower.selfadjointView<Eigen::Lower>();

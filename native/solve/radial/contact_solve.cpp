@@ -10,12 +10,12 @@
 namespace arapfields {
 namespace {
 
-/// Steps without contact at most, where the shape itself holds a handle back.
+/// Most iterations of comes_apart()'s solve without contact.
 constexpr Index steps_apart = 60;
-/// A shape on another way is better if it has less energy by that share.
+/// Relative decrease of the energy with which its solution replaces the current one.
 constexpr double better = 0.01;
 
-/// How the surface touches, and which handles are kept from their targets.
+/// Fills the report's part on contact.
 void report_contact(RadialState& s) {
   const double depth = s.contact.deepest();
   s.report.contact = {s.problem.frame().scale * depth,
@@ -25,14 +25,14 @@ void report_contact(RadialState& s) {
                       {}};
 }
 
-/// What is minimised, but for contact.
+/// The objective without its contact term.
 double value_without_contact(RadialState& s) {
   const RadialObjective<float>& objective = s.objective(s.fast);
   const VectorF& u = s.measurements(s.fast);
   return objective.value(u, nullptr) - objective.terms(u).contact;
 }
 
-/// What a look elsewhere changes.
+/// The state that a trial solve changes, to restore it if the trial is rejected.
 struct Before {
   RadialShape shape;
   SolveHistory history;
@@ -89,13 +89,13 @@ void ContactSolve::follow() {
   approach(slowly);
 }
 
-/// What was not followed here is followed from rest.
+/// Restarts from the rest shape, where the current one has no history of contact.
 void ContactSolve::start_at_rest() {
   go_back(state_.problem.basis.identity());
   motions_.assign(motions_.size(), Mat4::Identity());
 }
 
-/// The longest way of a target.
+/// The longest distance of a handle's target from its position under the last motions, in cube units.
 double ContactSolve::way() const {
   const HandleTerms& handles = state_.handles;
   const Points from = handles.targets_at(motions_between(handles.bound(), motions_, 0.0));
@@ -120,9 +120,9 @@ bool ContactSolve::starts_better(const RowMatrix<double>& coefficients) {
   return false;
 }
 
-/// Where the shape itself holds a handle back, a detour may have brought the surface there: solves without
-/// contact, and where the handles rest, pushes apart what overlaps then. Returns whether that is better; if
-/// not, all is as before.
+/// If self-contact holds a handle back, the shape may be in a poor local minimum: tries a solve without
+/// contact, and if the handles do not move, a projection of what overlaps after it. Returns whether the
+/// result is accepted; if not, the state is restored.
 bool ContactSolve::comes_apart() {
   RadialState& s = state_;
   const std::vector<HeldBack>& held = s.report.contact.held;
@@ -159,7 +159,7 @@ bool ContactSolve::may_be_clear() const {
   return state_.contact.deepest() <= 0.0 && !state_.contact.touches_itself();
 }
 
-/// Solves without contact. Whether nothing is near anything then.
+/// Solves without contact. Returns whether nothing penetrates after it.
 bool ContactSolve::ends_clear() {
   RadialState& s = state_;
   s.contact.release();
@@ -173,7 +173,7 @@ bool ContactSolve::ends_clear() {
   return true;
 }
 
-/// Pushes parts apart that a solve without contact has left in each other. Whether none is in another then.
+/// Separates parts that overlap after a solve without contact. Returns whether that succeeds.
 bool ContactSolve::pushes_apart() {
   steps_.approach_at_once(motions_);
   if (state_.contact.overlaps(state_.shape.coefficients)) return false;
@@ -181,7 +181,7 @@ bool ContactSolve::pushes_apart() {
   return true;
 }
 
-/// `slowly`: in small steps as well, and what is better stays.
+/// Continuation in usual steps; `slowly`: in small steps as well, and the better of both results is kept.
 void ContactSolve::approach(bool slowly) {
   const RowMatrix<double> start = state_.shape.coefficients;
   steps_.approach(motions_, way(), ContactApproach::usual);

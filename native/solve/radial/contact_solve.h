@@ -9,12 +9,12 @@
 
 namespace arapfields {
 
-/// A solve outside of the contact's obstacles, from the shape and the targets of the last one. It tries in
-/// turn: a solve without contact, if that comes near nothing; to push apart the parts that overlap after it;
-/// and to approach the targets by steps.
+/// A solve with contact constraints, from the shape and the targets of the last one. It tries in turn: one
+/// without contact, accepted if nothing penetrates after it; a projection that separates the parts which
+/// overlap after that; and continuation towards the targets (ContactApproach).
 class ContactSolve {
  public:
-  /// Solves without contact, in so many steps.
+  /// Solves without contact, in at most so many iterations.
   using Freely = std::function<void(Index)>;
   ContactSolve(RadialState& state, Index iterations, double tolerance, Freely freely,
                const Progress& progress);
@@ -36,7 +36,7 @@ class ContactSolve {
   Index iterations_;
   Freely freely_;
   ContactApproach steps_;
-  std::vector<Mat4> motions_;  // of the handles, that the shape was solved for
+  std::vector<Mat4> motions_;  // of the handles, for which the current shape was solved
 };
 
 }  // namespace arapfields

@@ -8,7 +8,7 @@
 namespace arapfields {
 namespace {
 
-/// Planes that stand for all: more would tell apart what no basis function does.
+/// Most springs of the update: the basis functions resolve no more.
 constexpr Index most_planes = 240;
 
 }  // namespace
@@ -18,7 +18,7 @@ ContactStiffness::ContactStiffness(const RadialBasis& basis, const ContactSet& s
   struct Spring {
     const ContactPlane* plane;
     Vec3 along;
-    double stiffness;  // times the share
+    double stiffness;  // times the area fraction
   };
   std::vector<Spring> springs;
   for (const ContactPlane& plane : set.planes) {

@@ -5,8 +5,9 @@
 
 namespace arapfields {
 
-/// What planes that press add to a preconditioner (L Lᵀ)⁻¹, by the Sherman–Morrison–Woodbury formula: each is
-/// stiff along its normal alone, so that the surface slides freely. For at most some hundreds of them.
+/// Low-rank update of the preconditioner (L Lᵀ)⁻¹ by the Hessian of the active contact planes and friction,
+/// with the Sherman–Morrison–Woodbury formula. A plane is stiff along its normal, and along its tangents only
+/// where friction acts. An even selection stands for all planes where there are more than some hundreds.
 class ContactStiffness {
  public:
   ContactStiffness() = default;
@@ -17,7 +18,7 @@ class ContactStiffness {
 
  private:
   ContactRows rows_;
-  RowMatrix<double> factor_;  // Cholesky factor of 2/(stiffness·share) + their compliance
+  RowMatrix<double> factor_;  // Cholesky factor of J Jᵀ + diag(2/(stiffness·share)), see ContactRows
 };
 
 }  // namespace arapfields

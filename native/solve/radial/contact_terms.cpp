@@ -13,24 +13,25 @@
 namespace arapfields {
 namespace {
 
-/// What is nearer has a plane, in cube units.
+/// Distance threshold for contact planes, in cube units: from an obstacle's margin, and in self-contact.
 constexpr double near = 0.04, near_itself = 0.05;
-/// Gaps may be less than kept by so much where nothing presses.
+/// Tolerance of the gap, in cube units, within which parts do not touch each other.
 constexpr double slight = 2e-4;
-/// Of itself, nothing that is farther is looked at.
+/// Upper bound of self-contact's search distance, in cube units.
 constexpr double farthest = 0.12;
-/// The cosine below which a normal is not of the side that a way came through: of a sheet, and of a solid,
-/// where it is of the opposite side of a thin one and not of one that shares an edge.
+/// Least cosine of the nearest normal with the normal where the path entered, for both to be on one side of
+/// the obstacle: of a sheet, and of a solid, where sides that share an edge count as one.
 constexpr double same_side = 0.3, opposite = -0.5;
-/// The cosine of neighbours' normals below which an edge lies between them.
+/// The cosine of neighbouring planes' normals below which an obstacle has an edge between them.
 constexpr double smooth = 0.9;
-/// More from the shape itself, of which the samples of both sides say less.
+/// Safety distance in self-contact, twice that of obstacles: both sides are known at samples alone.
 constexpr double kept_itself = 2.0 * ContactTerms::kept;
-/// What distances may be off by, in cube units: a straight way through a sheet is just as long as both
-/// together.
+/// Tolerance, in cube units, of the test whether a path may have crossed a surface: one that goes straight
+/// through a sheet is exactly as long as the distances at its ends together.
 constexpr double unsure = 1e-4;
 
-/// Places that came through a surface (rows of `now`) are beyond the side that they came from.
+/// Gives points whose path has entered a surface the tangent plane of the side that they entered by. `hits`
+/// are those of the rows `moved_rows` of `now`; nearest normals within `reach` of that side are kept.
 void go_back(const BarrierSurface& surface, PointsIn now, const std::vector<Index>& moved_rows,
              const std::vector<BarrierSurface::Hit>& hits, double reach, BarrierSurface::Nearest& nearest,
              Vector& offsets) {
@@ -39,7 +40,7 @@ void go_back(const BarrierSurface& surface, PointsIn now, const std::vector<Inde
     if (hit.share > 1.0) continue;
     const Index i = moved_rows[m];
     const double beyond = hit.normal.dot(now.row(i).transpose() - hit.place);
-    if (surface.is_sheet() && beyond < 0.0) {  // the side that it came from is the outer one
+    if (surface.is_sheet() && beyond < 0.0) {  // the side where the path began counts as outside
       nearest.normals.row(i) *= -1.0;
       nearest.distances[i] *= -1.0;
       offsets[i] *= -1.0;
@@ -47,28 +48,29 @@ void go_back(const BarrierSurface& surface, PointsIn now, const std::vector<Inde
     if (nearest.distances[i] < reach &&
         nearest.normals.row(i).dot(hit.normal) > (surface.is_sheet() ? same_side : opposite))
       continue;
-    if (beyond > 0.0 && nearest.distances[i] > 0.0) continue;  // around it
+    if (beyond > 0.0 && nearest.distances[i] > 0.0) continue;  // the point went around the surface
     nearest.normals.row(i) = hit.normal.transpose();
     nearest.distances[i] = beyond;
     offsets[i] = hit.normal.dot(hit.place);
   }
 }
 
-/// What an edge has passed is not taken to have come to its other side.
+/// Makes the distances of points whose path hits the obstacle at most 0, so that they keep their side even
+/// where the obstacle's edge has moved past them.
 void hold_behind(const std::vector<BarrierSurface::Hit>& hits, const std::vector<Index>& rows,
                  Vector& distances) {
   for (std::size_t m = 0; m < rows.size(); ++m)
     if (hits[m].share <= 1.0) distances[rows[m]] = std::min(0.0, distances[rows[m]]);
 }
 
-/// Samples between which and their neighbours an edge of an obstacle may poke through.
+/// Samples near an edge of an obstacle, which may poke through between them and their neighbours.
 std::vector<Index> at_edges(const ContactSet& found, ContactPoints& points,
                             const std::vector<BarrierSurface>& surfaces) {
   std::vector<const ContactPlane*> of(static_cast<std::size_t>(points.sample_count()));
   std::vector<Index> edges;
   const double reach = 2.0 * points.spacing();
   std::size_t first = 0;
-  while (first < found.planes.size()) {  // those of one surface lie beside each other
+  while (first < found.planes.size()) {  // the planes of one surface are consecutive
     std::fill(of.begin(), of.end(), nullptr);
     const Index k = found.planes[first].obstacle;
     std::size_t last = first;
@@ -110,7 +112,7 @@ void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<do
     for (Index k = 0; k < std::ssize(surfaces_); ++k) {
       BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
       if (surface.is_alike(before[static_cast<std::size_t>(k)]))
-        surface.set_placement(before[static_cast<std::size_t>(k)].placement());  // the ways go on
+        surface.set_placement(before[static_cast<std::size_t>(k)].placement());  // tracking continues
       else {
         see(k);
         ways_.cross(k, surface, points_, places_);
@@ -148,7 +150,7 @@ void ContactTerms::gather_surfaces() {
 }
 
 void ContactTerms::release() {
-  known_ = known_ && deepest_ <= 0.0 && !touches_itself_;  // then no planes are as good
+  known_ = known_ && deepest_ <= 0.0 && !touches_itself_;  // then no plane is active
   found_.revision = 0;
   found_.planes.clear();
   found_.places.resize(0, 3);
@@ -159,7 +161,7 @@ void ContactTerms::release() {
   touches_itself_ = false;
 }
 
-/// Places that may have a plane.
+/// Rows of points that may be within the distance threshold of a surface, by how far they have moved.
 std::vector<Index> ContactTerms::near_rows() const {
   std::vector<Index> rows;
   for (Index i = 0; i < places_.rows(); ++i)
@@ -174,13 +176,13 @@ std::vector<Index> ContactTerms::near_rows() const {
   return rows;
 }
 
-/// Adds the planes of obstacles and the ground for these places.
+/// Adds the planes of obstacles and grounds for these points, and updates their last outside positions.
 void ContactTerms::find_outside(const std::vector<Index>& rows) {
   const Points now = rows_of(places_, rows);
   for (Index k = 0; k < ways_.clear.cols(); ++k) {
     const Vector distances = add_planes(k, rows, now);
     for (Index i = 0; i < now.rows(); ++i) {
-      if (distances[i] <= 0.0) continue;  // it was last outside before
+      if (distances[i] <= 0.0) continue;  // inside: keeps its last outside position
       const Index row = rows[static_cast<std::size_t>(i)];
       ways_.seen[static_cast<std::size_t>(k)].row(row) = now.row(i);
       ways_.clear(row, k) = distances[i];
@@ -219,13 +221,13 @@ double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<d
   return deepest_;
 }
 
-/// Adds the planes of one surface for places (rows) that are `now` there. Returns their distances from it,
-/// negative also beyond what they came through.
+/// Adds the planes of surface k for points (rows) at positions `now`. Returns their signed distances, which
+/// are negative also for points that have tunnelled through it.
 Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsIn now) {
   const BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
   const Points& seen = ways_.seen[static_cast<std::size_t>(k)];
   BarrierSurface::Nearest nearest = surface.nearest(now);
-  std::vector<Index> moved_rows, starts;  // those that may have come through, and of all places
+  std::vector<Index> moved_rows, starts;  // points that may have crossed: rows of `now`, and of all points
   for (Index i = 0; i < now.rows(); ++i) {
     const Index row = rows[static_cast<std::size_t>(i)];
     const double way = (now.row(i) - seen.row(row)).norm(), clear = ways_.clear(row, k);
@@ -243,7 +245,7 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
     const Index row = rows[static_cast<std::size_t>(i)];
     const bool crossed = ways_.crosses(k, points_.sample_of(row));
     double margin = surface.margin() + kept;
-    if (crossed) margin = std::clamp(ways_.clear(row, k), 0.0, margin);  // it is not taken apart there
+    if (crossed) margin = std::clamp(ways_.clear(row, k), 0.0, margin);  // not more than it had at first
     const double gap = nearest.distances[i] - margin;
     const bool left = ways_.clear(row, k) == ContactWays::left_inside && nearest.distances[i] < 0.0;
     if (left || gap > near + further_) {
@@ -261,7 +263,7 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
     plane.obstacle = k;
     plane.anchor = carried.row(i).transpose();
     auto anchor = ways_.anchors[static_cast<std::size_t>(k)].row(row);
-    if (plane.pressure > 0.0) {  // it slides where it is farther from its anchor than friction lets it be
+    if (plane.pressure > 0.0) {  // the anchor follows a sliding point at the distance `stuck`
       const Vec3 slip = plane.along(plane.anchor - anchor.transpose());
       plane.anchor -= std::min(1.0, stuck / slip.norm()) * slip;
     }
@@ -271,7 +273,7 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
   return nearest.distances;
 }
 
-/// Adds the planes that samples of the shape itself carry along.
+/// Adds the planes of self-contact.
 void ContactTerms::add_own_planes(const RowMatrix<double>& coefficients, bool jumped) {
   const Index own = pressures_.cols() - 1;
   const Vector before = pressures_.col(own);

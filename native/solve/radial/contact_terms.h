@@ -12,75 +12,75 @@
 
 namespace arapfields {
 
-/// Where a surface meets obstacles and itself, and how hard it presses. What is beyond a plane is told by the
-/// ways of places since begin(), relative to the obstacle: nothing that is thinner than a step is passed.
+/// Contact of a surface with obstacles and itself: finds contact planes and keeps their multipliers. The path
+/// of a point since begin(), relative to an obstacle, tells its side: nothing tunnels through thin obstacles.
 class ContactTerms {
  public:
-  /// Distance beyond each margin, in cube units: what solves leave of a depth is within.
+  /// Safety distance beyond each margin, in cube units, larger than the depth that solves leave.
   static constexpr double kept = 1.5e-3;
   explicit ContactTerms(const RadialProblem& problem) : problem_(problem), points_(problem) {}
-  void prepare(const Progress& progress) { points_.choose(progress); }  ///< what takes long of set()
-  /// Obstacles that only move or change stay where they were until move_obstacles(). Throws InvalidInput.
+  void prepare(const Progress& progress) { points_.choose(progress); }  ///< the expensive part of set()
+  /// Obstacles that have moved keep their placements until move_obstacles(). Throws InvalidInput.
   void set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients);
-  /// A ground beside that of the contact; whether it is another one than before.
+  /// Sets a second ground, beside the contact's own; returns whether it has changed.
   bool set_further_ground(const std::optional<Ground>& ground);
   const std::optional<Contact>& contact() const { return contact_; }
   bool any() const { return !surfaces_.empty() || self_; }
   bool itself() const { return self_.has_value(); }
   bool only_itself() const { return self_ && surfaces_.empty(); }
 
-  /// The ways start here, without pressure, and obstacles are where they belong.
+  /// Starts tracking at this shape, with zero pressures and the obstacles at their current placements.
   void begin(const RowMatrix<double>& coefficients) { resume({}, coefficients); }
-  /// What the next step depends on; begins there with it.
+  /// The state that the next time step depends on; resume() restores it.
   ContactState held() const;
   void resume(const ContactState& state, const RowMatrix<double>& coefficients);
-  /// The coordinates of the cube have moved rigidly.
+  /// Applies a rigid change of the cube's coordinates.
   void change_coordinates(const Mat4& motion);
-  /// Takes the obstacles a share of the way from where resume() had them. `ahead`: the surface follows later.
+  /// Interpolates placements from those at resume() to the current ones. `ahead`: the surface moves later.
   void move_obstacles(double share, bool ahead = false);
-  /// The longest way left for a place of an obstacle's cube, in cube units.
+  /// Upper bound of the remaining motion of a point in an obstacle's cube, in cube units.
   double obstacle_way() const;
 
-  /// Follows the surface, and finds the planes near it. Returns how deep a place is beyond a margin.
-  /// `further`: what is near lies so much farther than usual, in cube units; none: as far as the surface has
-  /// moved since the last search. `jumped`: by an unknown way; facing normals tell what it came through.
+  /// Moves the contact points and finds the contact planes near them. Returns the greatest penetration depth
+  /// beyond a margin. `further` is added to the search distance, in cube units; none: the largest motion of a
+  /// point since the last search. `jumped`: the path is unknown; facing normals tell self-penetration.
   double find(const RowMatrix<double>& coefficients, std::optional<double> further = 0.0,
               bool jumped = false);
   ContactWays ways() const;
-  /// Takes back all searches since these were the ways.
+  /// Undoes all searches since ways() returned this.
   void set_ways(ContactWays ways);
-  /// What it goes on with after a look elsewhere.
+  /// The state to return to after a rejected trial.
   ContactPressing pressing() const { return {ways(), pressures_, found_.stiffness}; }
   void set_pressing(ContactPressing pressing);
-  /// The largest speed of a sample, where coefficients change at these rates.
+  /// The largest speed of a contact point for these rates of the coefficients.
   double fastest(const RowMatrix<double>& rates) {
     return std::sqrt(points_.at(rates).rowwise().squaredNorm().maxCoeff());
   }
-  /// Pressures after a solve that left the places of found() there, times a share of each surface. Returns
-  /// how much of them has changed, 0 to 1.
+  /// Multiplier update at the positions (n,3) of found()'s points, times a factor for each surface. Returns
+  /// the pressures' relative change, 0 to 1.
   double press(const double* places, const Vector& shares);
-  /// Obstacles, the ground and the shape itself.
+  /// Number of obstacles and grounds, and one for the shape itself.
   Index surface_count() const { return pressures_.cols(); }
-  /// Friction holds what was found, as hard as it presses.
+  /// Gives the planes Coulomb friction of their current pressures.
   void grip();
   void harden(bool more) { found_.harden(more); }
-  /// No planes: the surface is free.
+  /// Removes all planes and pressures.
   void release();
-  /// A solve with this contact left the shape at that revision; whether it did.
+  /// Records the shape's revision at which a solve with this contact ended, and compares it.
   void end_at(Revision shape) { ended_ = shape; }
   bool ended_at(Revision shape) const { return ended_ == shape; }
 
   const ContactSet& found() const { return found_; }
-  Index sample_of(Index place) const;  ///< of the problem's, that a found place is of
+  Index sample_of(Index place) const;  ///< row of the problem's samples of a point of found()
   bool presses() const { return !found_.planes.empty(); }
   std::string name_of(Index surface) const;
   const std::vector<BarrierSurface>& surfaces() const { return surfaces_; }  ///< obstacles and the ground
   double deepest() const { return deepest_; }
-  double deepest_outside() const { return deepest_outside_; }  ///< beyond obstacles and the ground alone
-  /// Whether parts of the surface touch as they were found.
+  double deepest_outside() const { return deepest_outside_; }  ///< without self-contact
+  /// Whether parts of the surface touched each other at the last search.
   bool touches_itself() const { return touches_itself_; }
-  std::vector<Index> crossing() const { return ways_.crossing(); }  ///< surfaces that places stay inside of
-  /// Whether a part is inside another one there, however deep.
+  std::vector<Index> crossing() const { return ways_.crossing(); }  ///< obstacles with points left inside
+  /// Whether a part is inside another one at this shape, however deep.
   bool overlaps(const RowMatrix<double>& coefficients);
 
  private:
@@ -97,24 +97,24 @@ class ContactTerms {
   std::optional<Contact> contact_;
   std::optional<Ground> further_ground_;
   std::vector<BarrierSurface> surfaces_;
-  std::vector<Mat4> starts_;   // placements that they move from
+  std::vector<Mat4> starts_;   // placements that move_obstacles() interpolates from
   std::vector<Mat4> ends_;     // and to
-  std::vector<Mat4> carried_;  // their last moves
+  std::vector<Mat4> carried_;  // the motions of its last call
   ContactPoints points_;
-  Points places_;  // at the last look
+  Points places_;  // positions at the last search
   std::optional<SelfContact> self_;
   ContactWays ways_;
-  RowMatrix<double> pressures_;  // (places, surfaces and the shape itself)
+  RowMatrix<double> pressures_;  // (points, surface_count()) multipliers
   ContactSet found_;
-  Revision sets_ = 0;  // that were found
+  Revision sets_ = 0;  // number of contact sets so far
   std::optional<Revision> ended_;
   double deepest_ = 0.0;
   double deepest_outside_ = 0.0;
   double further_ = 0.0;
   bool touches_itself_ = false;
-  bool ahead_ = false;  // obstacles have moved, and the surface follows later
-  bool grips_ = false;  // what was found last
-  bool known_ = false;  // nothing but the coefficients has changed since
+  bool ahead_ = false;  // obstacles have moved, and the surface has not followed yet
+  bool grips_ = false;  // whether the planes have friction
+  bool known_ = false;  // whether the last search is valid for its coefficients
 };
 
 }  // namespace arapfields

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The ways that a surface took beside obstacles, which may move, and what a next step needs of them.
+// On which side of moving obstacles the points of a surface are, and that state between time steps.
 #include <cmath>
 #include <utility>
 
@@ -9,7 +9,8 @@
 namespace arapfields {
 namespace {
 
-/// Notes samples that stay inside a surface, and where those that may be inside were last seen outside of it.
+/// Stores the points that are left inside a surface, and the last outside positions of those that have moved
+/// at least by their distance from it since, and so may be inside.
 void note_inside(Index k, const Points& places, const Points& seen, const Vector& clear,
                  ContactState& state) {
   for (Index row = 0; row < places.rows(); ++row)
@@ -64,7 +65,7 @@ void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& co
     }
 }
 
-/// The ways from a surface start where the places are.
+/// Starts the tracking of a surface's sides at the current places.
 void ContactTerms::see(Index k) {
   ways_.seen[static_cast<std::size_t>(k)] = ways_.anchors[static_cast<std::size_t>(k)] = places_;
   ways_.clear.col(k) = surfaces_[static_cast<std::size_t>(k)].distances(places_);
@@ -137,8 +138,8 @@ double ContactTerms::obstacle_way() const {
   return way;
 }
 
-/// New places were last seen outside where their samples were. Where an obstacle crosses the surface, they
-/// begin where they are.
+/// Refined points inherit the last outside positions of their samples, or start at their own places where an
+/// obstacle crosses the surface.
 void ContactTerms::add_finer_ways() {
   std::vector<Index> samples;
   for (Index row = ways_.clear.rows(); row < points_.size(); ++row) samples.push_back(points_.sample_of(row));

@@ -11,54 +11,55 @@
 
 namespace arapfields {
 
-/// The planes that places of a surface are kept beyond, until they are found anew.
+/// The contact planes (linearised contact constraints) of the last search, and the points that they act on.
 struct ContactSet {
-  std::vector<Index> rows;  ///< which of the places that are followed
-  Points places;            ///< (n,3) theirs at rest
-  Points embedded;          ///< (n,3) these, in the basis' embedding; empty without one
+  std::vector<Index> rows;  ///< rows of ContactPoints, ascending; planes index these
+  Points places;            ///< (n,3) rest positions of these points
+  Points embedded;          ///< (n,3) the same in the basis' interior embedding; empty without one
   std::vector<ContactPlane> planes;
   Revision revision = 0;                  ///< 0: no planes
-  double stiffness = 0.0;                 ///< of energy a unit of area for a unit of squared depth, halved
-  static constexpr double softest = 5e4;  ///< the stiffness at first
-  static constexpr double deep = 5e-4;    ///< solves leave no place deeper beyond a margin, in cube units
+  double stiffness = 0.0;                 ///< augmented-Lagrangian: energy ½·stiffness·depth² a unit of area
+  static constexpr double softest = 5e4;  ///< initial and least stiffness
+  static constexpr double deep = 5e-4;    ///< tolerance of the depth beyond a margin, in cube units
 
-  /// The share of the area that presses.
+  /// The fraction of the area in contact: where pressures are positive.
   double touching() const;
-  /// Forces of each surface, (surfaces, 3), on what is at a place: nearer ones count more.
+  /// Mean contact force of each surface, (surfaces, 3), near a place; the weights fall off with the distance.
   Points forces_at(const Vec3& place, const double* now, Index surfaces) const;
-  /// The planes become as stiff as their pressures ask for, by steps, or `more`: where depths do not fall.
+  /// Adapts the stiffness to the mean pressure; raises it if `more`, else lowers it gradually.
   void harden(bool more);
 };
 
-/// The ways that places took, of each surface: `seen` and `anchors` go along with it.
+/// The sides of each surface that contact points are on: their last positions outside it, and friction's
+/// anchors. `seen` and `anchors` move with the surface.
 struct ContactWays {
-  /// Clearance of places that an obstacle crosses: they stay inside until they come out by themselves.
+  /// Value of `clear` for points inside an obstacle that crosses the surface: they are not pushed out.
   static constexpr double left_inside = -std::numeric_limits<double>::infinity();
 
-  std::vector<Points> seen;     ///< where places were last known outside
-  std::vector<Points> anchors;  ///< where friction holds them
-  RowMatrix<double> clear;      ///< (places, surfaces) no surface is nearer to where they were seen
-  std::vector<std::vector<bool>> crossed;  ///< samples that surfaces cross at or beside; empty: none
+  std::vector<Points> seen;                ///< last position of each point known to be outside
+  std::vector<Points> anchors;             ///< anchors of friction
+  RowMatrix<double> clear;                 ///< (points, surfaces) signed distance at `seen`
+  std::vector<std::vector<bool>> crossed;  ///< samples at or beside an intersection; empty: none
   SelfContact::Ways own;
 
-  /// Finds where the surface crosses that of the places: what is inside there stays.
+  /// Finds where the obstacle crosses the deforming surface; points inside it there are left_inside.
   void cross(Index surface, const BarrierSurface& obstacle, const ContactPoints& points, PointsIn places);
-  /// Surfaces that places stay inside of.
+  /// Obstacles with points that are left_inside.
   std::vector<Index> crossing() const;
   bool crosses(Index surface, Index sample) const {
     const std::vector<bool>& samples = crossed[static_cast<std::size_t>(surface)];
     return !samples.empty() && samples[static_cast<std::size_t>(sample)];
   }
-  /// The surface and all that belongs to it have moved.
+  /// Applies an obstacle's motion to its `seen` and `anchors`.
   void carry(Index surface, const Mat4& motion);
-  /// Adds places, which are where the others at these rows are.
+  /// Appends points with copies of these rows.
   void add(const std::vector<Index>& like);
-  /// Of those that were added last, the ones of samples that the surface crosses begin where they are.
+  /// Starts the points appended last at their own places, where their samples are `crossed`.
   void begin_beside_crossings(Index surface, const BarrierSurface& obstacle,
                               const std::vector<Index>& samples, PointsIn places);
 };
 
-/// What a surface that presses goes on with.
+/// The contact state that a solve can be rolled back to.
 struct ContactPressing {
   ContactWays ways;
   RowMatrix<double> pressures;

@@ -14,13 +14,13 @@
 namespace arapfields {
 namespace {
 
-/// Samples that are followed at most; they lie denser than any detail of a radial field.
+/// Most contact samples; they are denser than any detail of a radial field.
 constexpr Index most_samples = 20000;
-/// Vertices of the mesh that stand farther out of the samples, in cube units, are followed, so many at most:
-/// less is within the distance that contact keeps.
+/// Mesh vertices farther than this from the samples' surface, in cube units, become contact points; nearer
+/// ones are within the safety distance of contact.
 constexpr double stands_out = 1e-3;
 constexpr Index most_vertices = 4000;
-/// Of the seed's random numbers, those for these samples.
+/// The random stream that chooses the samples.
 constexpr std::uint64_t stream = 3;
 
 }  // namespace
@@ -30,7 +30,7 @@ FollowedPlaces::FollowedPlaces(const SurfaceSamples& surface, const std::vector<
   Random random(seed, stream);
   samples = stratified(order, std::min(most_samples, surface.size()), random);
   rest = rows_of(surface.points, samples);
-  const double wide = 0.05;  // a cell holds about a square of the surface
+  const double wide = 0.05;  // a cell holds about wide² of the surface's area
   const PointGrid coarse(rest, wide);
   spacing = wide * std::sqrt(static_cast<double>(coarse.size()) / static_cast<double>(rest.rows()));
   if (!surface.mesh) return;

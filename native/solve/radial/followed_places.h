@@ -9,16 +9,17 @@
 
 namespace arapfields {
 
-/// What contact follows of a surface: samples, and vertices of its mesh that stand out of them.
+/// The contact points of a rest surface: a subset of its samples, and mesh vertices that stick out of them
+/// (sampling/standing_out.h).
 struct FollowedPlaces {
-  /// `order` lists the samples so that neighbours follow each other. Throws Cancelled.
+  /// `order` is a spatially coherent permutation of the samples. Throws Cancelled.
   FollowedPlaces(const SurfaceSamples& surface, const std::vector<std::uint32_t>& order, std::uint64_t seed,
                  const Progress& progress);
 
-  std::vector<Index> samples;  ///< rows of the surface's
-  std::vector<Index> parents;  ///< of each vertex, the nearest of these
-  Points rest;                 ///< (n,3) in the cube: the samples, then the vertices
-  double spacing = 0.0;        ///< about the distance of a sample to what it stands for
+  std::vector<Index> samples;  ///< rows of the surface's samples
+  std::vector<Index> parents;  ///< for each vertex the nearest entry of `samples`
+  Points rest;                 ///< (n,3) cube coordinates: the samples, then the vertices
+  double spacing = 0.0;        ///< mean sample spacing: square root of the area of a sample
 };
 
 }  // namespace arapfields

@@ -15,24 +15,25 @@
 namespace arapfields {
 namespace {
 
-/// Sweeps over the planes of a handle, and the change, in cube units, below which these end.
+/// Most sweeps of Hildreth's method, and its tolerance, in cube units.
 constexpr int most_sweeps = 200;
 constexpr double settled = 1e-6;
-/// What lies under a point handle, in widths of the shape there: no farther from it at rest, nor aside of it
-/// as seen along a plane's normal.
+/// A contact point is under a point handle if it is no farther from it than `under` at rest, nor than `aside`
+/// perpendicular to the plane's normal now, in widths of the shape there.
 constexpr double under = 1.5, aside = 0.35;
-/// A handle that has moved less than that, in cube units, is as good as at rest.
+/// Motion of a handle, in cube units, below which its weight no longer grows.
 constexpr double unmoved = 1e-3;
-/// Searches for the thickest part of the shape beside a point handle, which may lie at an edge.
+/// Searches for the thickest part of the shape near a point handle, which may lie at a thin edge.
 constexpr int thicker = 3;
-/// Planes of solids turn as long as the translation changes by more, in cube units, but so many times at
-/// most.
+/// Planes of curved solids are linearised anew, at most so many times, until the translation changes by less
+/// than `turned_enough`, in cube units.
 constexpr int most_turns = 6;
 constexpr double turned_enough = 1e-4;
-/// Those that it ends so far from, in cube units, stay; so do those whose normal would be of another side.
+/// A plane is linearised anew if the translated point is within `near_bound` of it, in cube units, and the
+/// cosine of the new normal with the old one is at least `same_side`.
 constexpr double near_bound = 0.05, same_side = 0.0;
 
-/// How little each handle gives way to others: what holds more, and what has moved less.
+/// Weight of each handle: its number of points over its mean squared motion.
 Vector masses_of(const BoundHandles& handles) {
   Vector masses(handles.count());
   for (Index i = 0; i < handles.count(); ++i) {
@@ -56,7 +57,7 @@ const std::vector<Index>& holders(RadialState& s) {
   });
 }
 
-/// Twice the thickness of what is no farther than that from each of the points.
+/// Width of the shape at each point: twice the greatest thickness within that distance.
 Vector widths_at(const RadialProblem& problem, const Points& points) {
   const Vector thickness = problem.shape->thickness->at(problem.surface());
   Vector widths = 2.0 * problem.shape->thickness->at(points);
@@ -71,6 +72,7 @@ Vector widths_at(const RadialProblem& problem, const Points& points) {
   return widths;
 }
 
+/// The sample nearest to each sample's reflection.
 const std::vector<Index>& mirrored(RadialState& s) {
   return s.mirrored.get({1}, [&] {
     const Points& samples = s.problem.surface();
@@ -88,7 +90,7 @@ HandleBounds::HandleBounds(RadialState& state, const std::vector<Mat4>& motions)
   if (!pins_.empty()) places_ = contact_places(state);
   for (const ContactPlane& plane : state.contact.found().planes) {
     bind(plane, false);
-    // What a symmetric field keeps beyond a plane, it keeps beyond the plane's reflection.
+    // A symmetric field satisfies the reflections of its constraints as well.
     if (state.problem.mirror) bind(plane, true);
   }
 }
@@ -113,7 +115,8 @@ std::vector<HandleBounds::Pin> HandleBounds::pins() const {
   return result;
 }
 
-/// How far a pin's target lies beyond a plane for what is under it to keep its length; −∞: not under it.
+/// Depth of the bound on a pin that keeps the rest distance between it and a contact point under it; −∞: the
+/// point is not under it.
 double HandleBounds::beyond(const Pin& pin, const Vec3& normal, double offset, const Place& place) {
   const double length = (place.rest - pin.rest).norm();
   const Vec3 arm = place.now - pin.now;
@@ -159,7 +162,7 @@ void HandleBounds::bind_to_surface(const ContactPlane& plane, const Vec3& normal
       .push_back({normal, plane.offset - normal.dot(target), plane.obstacle, target, over});
 }
 
-/// Of two handles the lighter gives way.
+/// Splits the constraint on two handles that meet in inverse proportion to their weights.
 void HandleBounds::bind_to_itself(const ContactPlane& plane, const Vec3& normal, const Place& first,
                                   const Place& second) {
   if (first.holder < 0 || second.holder < 0 || first.holder == second.holder) return;
@@ -169,7 +172,8 @@ void HandleBounds::bind_to_itself(const ContactPlane& plane, const Vec3& normal,
   bounds_of(second.holder).push_back({-normal, (1.0 - own) * depth, plane.obstacle});
 }
 
-/// By the method of Hildreth (1957).
+/// The least translation within bounds, a quadratic program, by Hildreth's method (1957); `pushes` are its
+/// multipliers.
 std::pair<Vec3, Index> HandleBounds::within(const std::vector<Bound>& bounds) {
   Vec3 way = Vec3::Zero();
   std::vector<double> pushes(bounds.size(), 0.0);
@@ -189,8 +193,7 @@ std::pair<Vec3, Index> HandleBounds::within(const std::vector<Bound>& bounds) {
                    : bounds[static_cast<std::size_t>(most - pushes.begin())].surface};
 }
 
-/// Where a translation would take what a handle holds, curved solids have other planes than where it is now.
-/// Whether any bound has become another one.
+/// Linearises the bounds of curved solids anew at the translated points. Returns whether any was changed.
 bool HandleBounds::turn(std::vector<Bound>& bounds, const Vec3& way) const {
   const RadialState& s = state_;
   bool any = false;

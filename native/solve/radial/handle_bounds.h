@@ -9,33 +9,32 @@
 
 namespace arapfields {
 
-/// What keeps handles from where motions would take them: of each the translations after which all that it
-/// holds, as it is and not squashed, is beyond the planes that were found.
+/// Contact constraints on the translations of handles: a translation is feasible if it brings all points that
+/// the handle holds, moved rigidly by the handle's motion, to the feasible side of the contact planes.
 class HandleBounds {
  public:
   HandleBounds(RadialState& state, const std::vector<Mat4>& motions);
-  /// The least translation of a handle within its bounds, and the surface that asks for the most of it; −1:
-  /// none.
+  /// The feasible translation t of least norm, and the surface of the largest multiplier; −1: t is zero.
   std::pair<Vec3, Index> least_translation(Index handle);
 
  private:
-  /// A translation moves a part along `normal` by `depth` or more.
+  /// The constraint normal·t ≥ depth on a translation t.
   struct Bound {
     Vec3 normal;
     double depth;
     Index surface;
-    std::optional<Vec3> target = std::nullopt;  ///< of the place that stays outside of a solid
-    bool over = false;                          ///< by its reflection
+    std::optional<Vec3> target = std::nullopt;  ///< the point's position under the motion; none: fixed normal
+    bool over = false;                          ///< of the plane's reflection (symmetric fields)
   };
-  /// A handle at one point, beneath which the shape keeps its width.
+  /// A point handle. The shape between it and the contact planes below keeps its width.
   struct Pin {
     Index handle;
     Vec3 rest;
     Vec3 now;
     Vec3 target;
-    double width;
+    double width;  ///< of the shape at the handle, in cube units
   };
-  /// A place of a plane, or its reflection, and the handle that holds it; −1: none.
+  /// A point of a contact plane, or its reflection, and the handle that holds it; −1: none.
   struct Place {
     Vec3 rest;
     Vec3 now;
@@ -57,9 +56,9 @@ class HandleBounds {
   RadialState& state_;
   const std::vector<Mat4>& motions_;
   const std::vector<Index>& holders_;
-  Vector masses_;  // how little each handle gives way to others
+  Vector masses_;  // weight of each handle: of two that meet, the lighter one moves more
   std::vector<Pin> pins_;
-  Points places_;  // of the planes, as they are now; empty without pins
+  Points places_;  // current positions of the contact set's points; empty without pins
   std::vector<std::vector<Bound>> bounds_;
 };
 

@@ -16,34 +16,35 @@
 namespace arapfields {
 namespace {
 
-/// Places whose distance inside the shape is less, in cube units, do not meet: no field parts the sides of a
-/// crease or the web between two fingers, which its functions reach over.
+/// Least distance through the inside of the shape at rest, in cube units, of two samples in contact: basis
+/// functions are too wide to separate the sides of a crease or of the web between two fingers.
 constexpr double far_inside = 0.15;
-/// Cosine of two normals below which their places face each other.
+/// Largest cosine of the normals of two samples that face each other.
 constexpr double facing = -0.1;
-/// Gaps at rest are looked for up to here, in cube units.
+/// Largest distance, in cube units, at which gaps at rest are searched for.
 constexpr double near_at_rest = 0.05;
-/// What a way that starts at a solved shape may have as overlap, in cube units.
+/// Penetration depth, in cube units, that a solved shape may have where tracking starts at it.
 constexpr double shallow = 0.01;
-/// Samples that are farther aside than so many spacings do not face each other.
+/// Largest tangential offset of a pair, in sample spacings.
 constexpr double spacings_aside = 2.0;
-/// Places where winding numbers are taken, and by how much more than at rest these are inside another part.
+/// Samples at which overlaps() takes winding numbers, and their increase over those at rest that means
+/// "inside another part".
 constexpr Index most_probes = 500;
 constexpr double inside_another = 0.6;
-/// The same above a sample that has entered another part: windings are blurred there.
+/// The same above a sample that has entered another part: less, as winding numbers are smoothed there.
 constexpr double entered = 0.4;
-/// Samples above which it is greater at rest are inside.
+/// Winding number above a sample at rest from which it is inside another part.
 constexpr double inside = 0.5;
-/// Where parts cut each other at rest, samples that are nearer there, in cube units, are left alone if one is
-/// no farther beyond the other than what is kept: the embedding, a function of the place, is of no use there.
-/// Probes that are nearer to a cut tell nothing.
+/// Where parts intersect at rest, two samples that are nearer at rest, in cube units, are excluded if one is
+/// within the safety distance of the other's plane or behind it: the interior embedding, a function of the
+/// place, cannot tell overlapping parts apart. Probes nearer to an intersection are left out.
 constexpr double near_a_cut = 0.1;
-/// Sides of a surface.
+/// Signs of the offset along the normal.
 constexpr double outwards = 1.0, inwards = -1.0;
-/// Meshes are so far from each other.
+/// Offset between meshes in the search structure's coordinates, which keeps them far from each other.
 constexpr double meshes_apart = 10.0;
 
-/// The blocks of a RadialEvaluator that rows in ascending order are in.
+/// The blocks of a RadialEvaluator that contain these rows (ascending).
 std::vector<Index> blocks_of(const std::vector<Index>& rows) {
   std::vector<Index> blocks;
   for (const Index row : rows)
@@ -76,7 +77,7 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
   rest.leftCols(6) = inside_;
   for (std::size_t i = 0; i < meshes_.size(); ++i) rest(static_cast<Index>(i), 6) = meshes_apart * meshes_[i];
   runs_.emplace(std::move(rest), far_inside);
-  const PointGrid grid(places, near_at_rest);  // about a square of the surface lies in each cell
+  const PointGrid grid(places, near_at_rest);  // a cell holds about near_at_rest² of the surface's area
   const double share = static_cast<double>(grid.size()) / static_cast<double>(n);
   aside_ = spacings_aside * near_at_rest * std::sqrt(share);
   kept_ = kept;
@@ -91,7 +92,7 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
   begin(places, [&](auto*) { return normals; });
 }
 
-/// Finds what a sample adds to winding numbers, and these at rest.
+/// Scales the winding numbers to a jump of 1 across the surface, and computes those at rest.
 void SelfContact::measure_rest(PointsIn places) {
   const SampleWindings at_rest(places, normals_, aside_);
   above_.resize(places.rows());
@@ -102,14 +103,14 @@ void SelfContact::measure_rest(PointsIn places) {
   Vector jumps = below_ - above_(probes_);
   const Index half = jumps.size() / 2;
   std::nth_element(jumps.begin(), jumps.begin() + half, jumps.end());
-  share_ = 1.0 / std::max(jumps[half], 1e-12);  // one between the sides of a surface
+  share_ = 1.0 / std::max(jumps[half], 1e-12);  // the median jump becomes 1
   below_ *= share_;
   above_ *= share_;
   is_cut_ = below_.maxCoeff() > 1.0 + inside_another;
   if (is_cut_) find_cuts(places);
 }
 
-/// Finds the nearest place that is inside another part, and leaves out the probes that are near it.
+/// Finds for each sample the nearest one inside another part at rest, and drops the probes near such samples.
 void SelfContact::find_cuts(PointsIn places) {
   std::vector<Index> within, kept;
   for (Index i = 0; i < above_.size(); ++i)
@@ -135,8 +136,8 @@ bool SelfContact::is_far(Index i, Index j, double distance) const {
   return (inside_.row(i) - inside_.row(j)).squaredNorm() > distance * distance;
 }
 
-/// Whether two samples of parts that cut each other at rest are left alone: where they are near each other by
-/// way of the cut, or one behind the other.
+/// Whether a pair is excluded because parts intersect at rest: its samples are near each other by a path
+/// through the intersection, or near each other with one behind the other.
 bool SelfContact::is_cut(Index i, Index j) const {
   if (!is_cut_) return false;
   const auto at = [&](Index k) { return inside_.row(k).leftCols<3>(); };
@@ -149,19 +150,20 @@ bool SelfContact::is_cut(Index i, Index j) const {
                                  far_inside;
 }
 
-/// Whether what is beyond a sample came through it: it faced the same part before, or was before it.
+/// Whether sample i, behind sample j's tangent plane, has passed through it: at the last search i was paired
+/// with the same part, or in front of j.
 bool SelfContact::came_through(Index i, Index j, const Vec3& normal) const {
   const Index before = ways_.faced[static_cast<std::size_t>(i)];
   return (before >= 0 && !is_far(before, j, far_inside)) ||
          (ways_.seen.row(i) - ways_.seen.row(j)).dot(normal.transpose()) >= 0.0;
 }
 
-/// Whether samples may meet that are near each other now.
+/// Whether a pair of samples is not excluded.
 bool SelfContact::may_meet(Index i, Index j) const {
   return least_[i] > 0.0 && least_[j] > 0.0 && is_far(i, j, far_inside) && !is_cut(i, j);
 }
 
-/// Whether a gap along the normal of the second sample is one of a pair.
+/// Whether a gap along the normal of sample j makes a pair.
 bool SelfContact::is_gap(double gap, Index i, Index j, const Vec3& normal, Beyond beyond) const {
   switch (beyond) {
     case Beyond::none:
@@ -175,7 +177,7 @@ bool SelfContact::is_gap(double gap, Index i, Index j, const Vec3& normal, Beyon
   }
 }
 
-/// The nearest sample of runs that one faces, nearer than `near`; −1: none.
+/// The nearest sample within `near` that sample i faces, out of these runs; −1: none.
 Index SelfContact::faced_by(Index i, const std::vector<Index>& runs, PointsIn places, const Points& normals,
                             double near, Beyond beyond) const {
   if (least_[i] <= 0.0) return -1;
@@ -200,7 +202,7 @@ Index SelfContact::faced_by(Index i, const std::vector<Index>& runs, PointsIn pl
 
 std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& normals_at, double near,
                                             Beyond beyond) {
-  Points areas;  // known at once where they are needed everywhere, as they are below
+  Points areas;  // all normals at once if the last search needed them for winding numbers
   if (std::exchange(is_beyond_, false)) areas = normals_at(nullptr);
   Points normals = unit_rows(areas);
   const std::vector<std::vector<Index>> near_to =
@@ -239,7 +241,7 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
   if (is_beyond_) {
     if (areas.rows() == 0) areas = normals_at(nullptr);
     const SampleWindings now(places, share_ * areas, aside_);
-    look(Beyond::none, [&](Index i) {  // the two sides of what is squashed do not meet
+    look(Beyond::none, [&](Index i) {  // outside by its winding number: opposite sides of one thin part
       return is_beyond(i) && winding(now, i, outwards, places, areas) - above_[i] < entered;
     });
   }
@@ -254,14 +256,14 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
   return pairs;
 }
 
-/// The winding number a little above or below a sample.
+/// The winding number at a small offset from a sample along its normal, outwards or inwards by `side`.
 double SelfContact::winding(const SampleWindings& windings, Index i, double side, PointsIn places,
                             PointsIn normals) const {
   const double way = side * std::min(aside_, 0.5 * widths_[i]);
   return windings.at((places.row(i) + way * normals.row(i).normalized()).transpose());
 }
 
-/// The same below the probes.
+/// Winding numbers at the inward offsets of the probes.
 Vector SelfContact::below(const SampleWindings& windings, PointsIn places, PointsIn normals) const {
   Vector result(std::ssize(probes_));
   for (Index k = 0; k < result.size(); ++k)

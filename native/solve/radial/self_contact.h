@@ -12,41 +12,44 @@
 
 namespace arapfields {
 
-/// A place of a surface that faces another one, far from it inside the shape.
+/// A sample in self-contact with another one, whose tangent plane it must not pass.
 struct FacingPair {
   Index first = 0;
   Index second = 0;
   Vec3 normal;         ///< of the second, outwards
-  double gap = 0.0;    ///< along the normal
-  double least = 0.0;  ///< gap to be kept: as at rest where that is less
+  double gap = 0.0;    ///< signed, along the normal
+  double least = 0.0;  ///< smallest allowed gap: the safety distance, or the gap at rest if that is smaller
 };
 
-/// Where a surface meets itself. Samples that are near each other inside the shape, and those that touch or
-/// overlap others at rest, are left alone. Which side a sample came from tells what is beyond.
+/// Proximity search for self-contact. Pairs of samples with a short distance through the inside of the shape,
+/// and samples that touch or overlap others at rest, are excluded. The pairs of the last search tell a sample
+/// that has passed through another part from one that approaches it from behind.
 class SelfContact {
  public:
-  /// What tells which side a place came from.
+  /// The state of the last search.
   struct Ways {
-    Points seen;               ///< places at the last search
-    std::vector<Index> faced;  ///< what each faced then; −1: nothing
+    Points seen;               ///< (n,3) positions
+    std::vector<Index> faced;  ///< second sample of each one's pair; −1: none
   };
-  /// (n,3) as long as the surface there is stretched, in these blocks of a RadialEvaluator; null: in all.
+  /// Deformed normals (n,3), scaled by the area ratio, in these blocks of a RadialEvaluator; null: in all.
   using Normals = std::function<Points(const std::vector<Index>* blocks)>;
-  /// For these rows of the problem's samples. Throws InvalidInput without normals.
+  /// For these rows of the problem's samples, with a safety distance `kept`, in cube units. Throws
+  /// InvalidInput without normals.
   SelfContact(const RadialProblem& problem, const std::vector<Index>& rows, double kept);
 
-  /// For each sample the nearest one that it faces, within `near`, of cube units, at places (n,3); `normals`
-  /// are asked for where parts are near each other. `jumped`: the way here is not known.
+  /// Pairs each sample with the nearest one that it faces within `near`, in cube units, at places (n,3).
+  /// `normals` is called only if parts are near each other. `jumped`: the last search says nothing of how the
+  /// shape came here, so that all negative gaps count.
   std::vector<FacingPair> find(PointsIn places, const Normals& normals, double near, bool jumped = false);
-  /// Whether a part is inside another one, however deep, where it is not at rest.
+  /// Whether a part is inside another one, however deep, that it is outside of at rest (by winding numbers).
   bool overlaps(PointsIn places, PointsIn normals) const;
   const Ways& ways() const { return ways_; }
   void set_ways(Ways ways) { ways_ = std::move(ways); }
-  /// The ways start here.
+  /// Starts at a solved shape: as the last search, but only shallow negative gaps count.
   void begin(PointsIn places, const Normals& normals);
 
  private:
-  /// Which gaps below zero are pairs.
+  /// Which negative gaps (penetrations) count as pairs; at_rest is `all` without the test of winding numbers.
   enum class Beyond { none, as_came, shallow, all, at_rest };
   std::vector<FacingPair> search(PointsIn places, const Normals& normals, double near, Beyond beyond);
   bool is_far(Index i, Index j, double distance) const;
@@ -63,22 +66,22 @@ class SelfContact {
   void find_cuts(PointsIn places);
   void remember(PointsIn places, const std::vector<FacingPair>& pairs);
 
-  RowMatrix<double> inside_;  // (n,6) rest places and their embedding
+  RowMatrix<double> inside_;  // (n,6) rest positions and their interior embedding
   Points normals_;            // (n,3) at rest
   double kept_ = 0.0;
-  bool is_cut_ = false;  // whether parts cut each other at rest
+  bool is_cut_ = false;  // whether parts intersect at rest
   std::optional<FacingRuns> runs_;
   std::vector<std::int32_t> meshes_;
-  Points cuts_;                // (n,3) nearest places at rest that are inside another part; empty: none
-  std::vector<Index> probes_;  // rows below which windings are taken
-  Vector below_;               // windings there at rest
-  Vector above_;               // (n) windings above the samples at rest
-  double share_ = 1.0;         // of a sample in them
-  Vector widths_;              // (n) of the shape there
-  Vector least_;               // (n) gaps at rest, at most what is kept; 0: left alone
-  double aside_ = 0.0;         // what is farther aside does not face
+  Points cuts_;                // (n,3) nearest rest position of a sample inside another part; empty: none
+  std::vector<Index> probes_;  // samples below which winding numbers are evaluated
+  Vector below_;               // winding numbers below the probes at rest
+  Vector above_;               // (n) winding numbers above the samples at rest
+  double share_ = 1.0;         // scale for which winding numbers jump by 1 across the surface
+  Vector widths_;              // (n) local width of the shape: twice its thickness
+  Vector least_;               // (n) gaps at rest, at most kept_; 0: excluded
+  double aside_ = 0.0;         // largest tangential offset of a pair, in cube units
   Ways ways_;
-  bool is_beyond_ = false;  // whether a sample was beyond another at the last search
+  bool is_beyond_ = false;  // whether a gap was negative at the last search
 };
 
 }  // namespace arapfields
