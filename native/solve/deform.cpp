@@ -52,7 +52,7 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
   return terms;
 }
 
-/// A radial field inside the blend with the handles' motions: a neural field whose network is zero.
+/// A radial field blended with the handles' motions, stored as a neural field whose network is zero.
 Solution exact_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                       const DeformOptions& options, const Progress& progress, const SolveHooks& hooks) {
   const BoundHandles bound(in_cube(handles, samples.frame), samples.points);

@@ -21,7 +21,7 @@ bool names_a_network(const Options& given) {
          given.machine.device.starts_with("cuda");
 }
 
-/// Each coupling layer's network is narrower and shallower than the one of a neural field.
+/// The coupling layers' networks are narrower and shallower than that of a neural field.
 CouplingShape coupling_shape(NetworkOptions network, int couplings) {
   network.width = std::max(1, network.width / 4);
   network.layers = std::max(1, network.layers / 2);
@@ -63,8 +63,8 @@ std::shared_ptr<TrainableField> trained_field(const Options& options) {
   return field;
 }
 
-/// What one layer changes, all that follow carry on: steps of coupling layers have to be smaller, and more,
-/// which their narrow networks make up for.
+/// Coupling layers are composed, so a change of one passes through all later ones: they take smaller steps,
+/// and more of them, which their narrow networks make up for.
 template <class Options>
 LoopOptions training_of(const Options& options) {
   LoopOptions loop;

@@ -7,11 +7,11 @@
 
 namespace arapfields {
 
-/// What a caller of deform or stylize may add to the solve.
+/// Optional additions to deform and stylize.
 struct SolveHooks {
   ExternalEnergies energies;            ///< terms that join the loss
   IterationObserver observer;           ///< called after each iteration
-  std::optional<Contact> contact = {};  ///< what the surface does not pass
+  std::optional<Contact> contact = {};  ///< contact constraints
 };
 
 }  // namespace arapfields

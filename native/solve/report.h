@@ -9,16 +9,16 @@
 
 namespace arapfields {
 
-/// Fills everything but `loop` and `warnings`. Energies and distortion are means and extremes over at most
-/// `max_samples` of the samples, evenly spread in their order.
+/// Measures all of a report but `loop` and `warnings`. Energies and distortion are means and extremes over at
+/// most `max_samples` of the samples, evenly spaced in their order.
 SolveReport measure(const DeformationField& field, const SurfaceSamples& samples, const ObjectiveTerms& terms,
                     Index max_samples = 4000);
 
-/// A report, with its warnings, on a field that another solver made.
+/// A field that another solver made, with its report and warnings.
 Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples& samples,
                   const ObjectiveTerms& terms, LoopResult loop);
 
-/// Puts another objective around the one that solve_field makes.
+/// Makes the objective to minimise out of solve_field's own, for terms that it does not know.
 using WrapObjective = std::function<std::unique_ptr<Objective>(Objective& inner)>;
 
 /// Runs the loop, measures the result, and turns Diverged into SolveDiverged.

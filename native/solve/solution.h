@@ -21,8 +21,8 @@ struct SolveReport {
   ArapValue arap;                   ///< arap.energy with the samples' own stiffness
   std::vector<double> handle_mean;  ///< distance ‖f(x) − C x‖, of each handle
   std::vector<double> handle_max;
-  std::optional<double> far_target;  ///< sizes of the shape to the farthest target, where that is far
-  std::optional<double> preference;  ///< mean g of the deformed normals, or mean ñ·t of an object's style
+  std::optional<double> far_target;  ///< FarTarget::sizes (solve/warnings.h); none: no target is far
+  std::optional<double> preference;  ///< mean g(ñ) of the deformed normals, or mean ñ·T(n) (object's style)
   Distortion distortion;
   ContactReport contact;
   LoopResult loop;
@@ -34,7 +34,7 @@ struct Solution {
   SolveReport report;
 };
 
-/// Diverged, with the last good state.
+/// Diverged, with the field of the last finite state.
 class ARAPFIELDS_EXPORT SolveDiverged : public Diverged {
  public:
   SolveDiverged(const Diverged& cause, Solution last) : Diverged(cause), last_good(std::move(last)) {}

@@ -21,7 +21,7 @@ void check_samples(const SurfaceSamples& samples, const Vector& weights) {
           "all must be 0 or larger");
 }
 
-/// A handle that holds the lowest sample of the surface.
+/// A point handle that holds the lowest sample in place.
 Handle lowest_point(const SurfaceSamples& samples, const Vec3& up) {
   Index lowest = 0;
   (samples.points * up).minCoeff(&lowest);
@@ -31,7 +31,7 @@ Handle lowest_point(const SurfaceSamples& samples, const Vec3& up) {
   return handle;
 }
 
-/// A translation changes no other term, so that the point can be put back exactly.
+/// Translates the field so that the handle's error is 0; no other term depends on translations.
 void anchor_lowest_point(TrainableField& field, const Handle& handle) {
   Points value(1, 3);
   field.evaluate(handle.rest_point.transpose(), {value.data(), 1, JetOrder::value});

@@ -8,11 +8,11 @@
 namespace arapfields {
 namespace {
 
-/// √λ in thicknesses: with it λ is 0.01, the paper's, at the median of the bunny's surface.
+/// √λ over the local thickness, chosen such that λ is the paper's 0.01 at the bunny's median thickness.
 constexpr double bending_length = 0.345;
 /// Weight of a sample in a handle that may scale.
 constexpr double yielding = 0.01;
-/// λ where it is the same everywhere: the paper's.
+/// The paper's λ, for a stiffness that is the same everywhere.
 constexpr double uniform_bending = 0.01;
 
 }  // namespace

@@ -29,8 +29,8 @@ class SurfaceStiffness {
   std::shared_ptr<const LocalThickness> thickness_;
 };
 
-/// w of each sample (empty: all 1): the samples' own weights, but almost 0 in a handle that may scale, whose
-/// size the energy would resist.
+/// w of each sample (empty: all 1): the samples' own weights, but nearly 0 in a handle that may scale, since
+/// the energy resists scaling.
 Vector energy_weights(const SurfaceSamples& samples, const BoundHandles& handles);
 
 /// The samples' λ times their own bend weights.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Taking another field's shape, and adding samples where the field folds.
+// Fitting another field, and adding energy samples where the field folds.
 #include <cmath>
 
 #include "core/parallel.h"
@@ -12,8 +12,7 @@ namespace {
 
 double dot(const RowMatrix<double>& a, const RowMatrix<double>& b) { return a.cwiseProduct(b).sum(); }
 
-/// What an objective of single precision would measure of a field, which may have another frame: the plane of
-/// reflections may have moved it.
+/// The single-precision measurements of another field, whose frame may differ (symmetry changes the frame).
 VectorF measured(RadialState& s, const DeformationField& field) {
   const Frame &from = field.frame(), &own = s.problem.frame();
   const auto jets_at = [&](const Points& points, JetOrder order) {
@@ -40,9 +39,9 @@ VectorF measured(RadialState& s, const DeformationField& field) {
 
 }  // namespace
 
-/// The projection in the surrogate's norm, by preconditioned conjugate gradients (Nocedal & Wright 2006,
-/// algorithm 5.3), since the preconditioner knows a part of the samples. What single precision leaves of far
-/// coefficients grows with each round: the round of least energy is the start.
+/// Least-squares fit in the norm of the quadratic model (RadialObjective::weighted), by preconditioned
+/// conjugate gradients (Nocedal & Wright 2006, algorithm 5.3). Rounding errors of single precision grow with
+/// the iterations, so they end when the energy no longer decreases.
 void RadialSolver::adopt(const DeformationField& field) {
   constexpr int rounds = 8;
   RadialState& s = *state_;
@@ -74,20 +73,20 @@ void RadialSolver::adopt(const DeformationField& field) {
     square = next;
   }
   s.dynamics.zero_velocity(motions_of(s.handles.bound()));
-  s.contact.begin(s.problem.basis.identity());  // the other field may have passed a sheet
+  s.contact.begin(s.problem.basis.identity());  // the other field may have crossed a sheet
 }
 
 Index RadialSolver::add_fold_samples(double barrier) {
   RadialState& s = *state_;
   const ThreadScope threads(s.problem.options.threads);
   const std::vector<Index>& chosen = s.problem.energy_samples;
-  // Samples that the energy does not see, neighbours beside each other.
+  // Samples that are no energy samples, in spatial order.
   std::vector<bool> seen(static_cast<std::size_t>(s.problem.samples.size()), false);
   for (const Index i : chosen) seen[static_cast<std::size_t>(i)] = true;
   std::vector<Index> unseen;
   for (const std::uint32_t i : s.problem.shape->order)
     if (!seen[i]) unseen.push_back(i);
-  // Those that the field folds at, or nearly does.
+  // Those at which the field folds, or nearly does.
   const Index count = static_cast<Index>(unseen.size());
   JetBlock<double> jets(count, JetOrder::first);
   field()->evaluate(rows_of(s.problem.surface(), unseen), jets.view());

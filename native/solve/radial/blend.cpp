@@ -20,12 +20,12 @@ RadialBlend<Scalar>::RadialBlend(const HandleBlend& blend, PointsIn samples) {
   JetBlock<double> moved(n, JetOrder::second);
   blend.evaluate(samples, moved.view());
   for (Index p = 0; p < n; ++p) {
-    if (free[p] == 1.0) continue;  // its derivatives vanish where it does
+    if (free[p] == 1.0) continue;  // a = 1 has zero derivatives: outside all margins
     rows_.push_back(p);
     for (int c = 0; c < all; ++c) free_.push_back(static_cast<Scalar>(free[c * n + p]));
     for (int c = 0; c < all; ++c)
       for (int i = 0; i < 3; ++i) {
-        double product = free[c * n + p] * samples(p, i);  // of a and the coordinate
+        double product = free[c * n + p] * samples(p, i);  // jet of a·x_i
         if (c >= 1 && c <= 3) product += c == first_column(i) ? free[p] : 0.0;
         for (int j = 0; j < 3 && c > 3; ++j)
           if (second_column(i, j) == c) product += (i == j ? 2.0 : 1.0) * free[first_column(j) * n + p];

@@ -7,9 +7,9 @@
 
 namespace arapfields {
 
-/// Exact handles around a radial field r at the samples of a live solve: f = h + a (r − identity) with h and
-/// its free weight a (fields/handle_blend.h). Linear in r but for a part that the targets decide. Only
-/// samples in boxes and margins are touched; empty: f = r.
+/// Exact handles around a radial field r at the samples of a live solve: f = h + a (r − identity), with the
+/// handles' blended motion h and the free weight a (fields/handle_blend.h). Affine in r; the constant part
+/// depends on the targets. Stores samples in handle boxes and margins alone; empty: f = r.
 template <class Scalar>
 class RadialBlend {
  public:

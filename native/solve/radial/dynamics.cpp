@@ -13,8 +13,9 @@
 namespace arapfields {
 namespace {
 
-/// Velocities and accelerations half of which a usual step takes, as the root of its length, by their
-/// mean ‖J‖² + λ‖D‖² against their mean square: waves shorter than a part is thick, which solves see last.
+/// Cut-off of the low-pass filter S below, for steps of `usual_step`: the ratio of mean ‖J‖² + λ‖D‖² to the
+/// mean square at which S = ½, of waves shorter than parts are thick, where solves converge last. τ is
+/// proportional to the square root of the step.
 constexpr double smoothed = 3e3;
 
 }  // namespace
@@ -68,8 +69,8 @@ std::optional<Body<Scalar>> SurfaceDynamics::inertia_terms(double inertia, Point
 template std::optional<Body<float>> SurfaceDynamics::inertia_terms<float>(double, PointsF);
 template std::optional<Body<double>> SurfaceDynamics::inertia_terms<double>(double, Points);
 
-/// 1 − (1 − S)² of S = (G + τK)⁻¹ G, for the mean squares of the values at the samples and of the
-/// derivatives: also without what no sample sees.
+/// Applies the filter 1 − (1 − S)² with S = (G + τK)⁻¹ G; G is the Gram matrix of the values at the energy
+/// samples, K the stiffness matrix. It also removes components that vanish at all samples.
 RowMatrix<double> SurfaceDynamics::smooth(const RowMatrix<double>& x, const StiffnessTerms& stiffness,
                                           double h) {
   const std::array revisions{problem_.energy_revision, stiffness.revision(), std::bit_cast<Revision>(h)};

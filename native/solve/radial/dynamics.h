@@ -11,37 +11,38 @@
 
 namespace arapfields {
 
-/// Seconds of the step for which the constants of motions are chosen.
+/// Length of a time step, in seconds, for which the constants of secondary motion are chosen.
 constexpr double usual_step = 1.0 / 96.0;
 
-/// The surface as a body with a mass: its velocity and acceleration, and the forces that it feels.
+/// State of secondary motion: masses, velocity and acceleration of the surface, and its inertial terms.
 class SurfaceDynamics {
  public:
   explicit SurfaceDynamics(const RadialProblem& problem) : problem_(problem) {}
-  /// None, or strength 0: no mass. Throws InvalidInput for numbers that cannot be.
+  /// None, or strength 0: no mass. Throws InvalidInput for numbers out of range.
   void set(const std::optional<SecondaryMotion>& motion);
   const std::optional<SecondaryMotion>& motion() const { return motion_; }
   bool has_mass() const { return motion_ && motion_->options.strength > 0.0; }
-  /// Against the energy of the surface, in seconds²/cube unit².
+  /// Total mass, in units of the surface's energy · seconds²/cube unit².
   double mass() const { return unit_mass * motion_->options.strength; }
   /// Relative masses of the energy samples.
   const Vector& masses();
   /// ½ mass · mean m ‖v‖² for velocities v (n,3) of the energy samples.
   double kinetic_energy(PointsIn velocities);
-  /// What the objective adds for a body with this inertia that would go to the goal (n,3) without forces.
+  /// The objective's terms of a body (energies/body.h) with this inertia, whose energy samples would move to
+  /// `goal` (n,3) without forces; none without a mass.
   template <class Scalar>
   std::optional<Body<Scalar>> inertia_terms(double inertia = 0.0, PointsOf<Scalar> goal = {});
-  /// Velocities or accelerations without their short waves, after steps of length h.
+  /// Low-pass filter of velocities or accelerations (coefficients), for time steps of length h.
   RowMatrix<double> smooth(const RowMatrix<double>& x, const StiffnessTerms& stiffness, double h);
-  /// The body is at rest where the handles have these motions.
+  /// Sets zero velocity and unknown acceleration, with the handles at these motions.
   void zero_velocity(std::vector<Mat4> handle_motions);
   Revision revision() const { return revision_; }
-  /// Of the masses.
+  /// Revision of the masses.
   Revision mass_revision() const { return mass_revision_; }
 
   RowMatrix<double> velocities;     ///< of the coefficients; empty: at rest
-  RowMatrix<double> accelerations;  ///< of the coefficients, by the last step's forces; empty: not known
-  std::vector<Mat4> motions;        ///< of the handles where the last step or solve ended; empty: not known
+  RowMatrix<double> accelerations;  ///< of the coefficients, at the end of the last step; empty: unknown
+  std::vector<Mat4> motions;        ///< of the handles at the end of the last step or solve; empty: unknown
 
  private:
   static constexpr double unit_mass = 1.0 / 300.0;

@@ -14,33 +14,35 @@
 namespace arapfields {
 namespace {
 
-/// Steps between two checks of the clock and of the gain.
+/// Quasi-Newton iterations between two checks of the time budget and of convergence.
 constexpr int steps_at_once = 10;
-/// A deformation has converged where these steps gain less than this share of the energy. Thin parts under
-/// many held samples would go on for hundreds of steps, for a ten-thousandth.
+/// A deformation has converged if `steps_at_once` iterations reduce the energy by less than this fraction.
+/// Thin parts under many held samples would take hundreds of iterations more for a gain of 1e-4.
 constexpr double least_gain = 1e-3;
-/// It goes on while these steps bring what is deep in an obstacle out to less than this share.
+/// It continues while they reduce the penetration depth to less than this fraction.
 constexpr double still_comes_out = 0.8;
-/// Rises of the energy after which it goes on all the same: contact holds back what free steps had gained.
+/// Increases of the energy that do not end it: contact planes that become active raise the energy.
 constexpr int most_rises = 6;
-/// Factor on it where handles are held back: they would slide on for long.
+/// Factor on least_gain while contact holds handles back, which would slide slowly for many iterations.
 constexpr double less_where_held = 10.0;
-/// A deformation with `worth_a_first` centers starts from one with half of them, `most_first` at most.
+/// A deformation with at least `worth_a_first` centers starts from a solve with half of them, `most_first` at
+/// most, of `first_steps` iterations.
 constexpr int worth_a_first = 600, most_first = 500, first_steps = 20;
-/// The solve that a stylization starts from.
+/// Centers, samples and iterations of the coarse solve that a stylization starts from.
 constexpr int style_first_centers = 400, style_first_samples = 4000, style_first_steps = 30;
-/// A style that folds between the energy samples is solved on with those samples and a heavier barrier.
+/// A styled field that folds between the energy samples is solved again, in rounds, with the folded samples
+/// added and the weight of the fold barrier multiplied by `unfolding`.
 constexpr int unfolding_rounds = 5, unfolding_steps = 15;
 constexpr double unfolding = 3.0;
-/// Exact handles pull with this share of their weight at the radial field inside the blend, which nothing
-/// else holds in their boxes.
+/// Factor on the weight of exact handles as soft handles of the radial field inside the blend, which no other
+/// term holds within their boxes.
 constexpr double share_of_exact = 0.01;
-/// Surface samples, and energy samples, for each center. A basis with more centers than samples can tell
-/// apart would fit the samples and fold between them.
+/// Fewest surface samples, and energy samples, for each center: with fewer, the field overfits the samples
+/// and folds between them.
 constexpr int samples_a_center = 8, energy_samples_a_center = 10;
-/// Samples of a handle that are held. With fewer, chance decides how much room is left for the bend.
+/// Samples of a handle that enter the energy; with fewer, the result depends on which ones are drawn.
 constexpr int held_samples = 1024;
-/// Exact handles have narrow margins and need more centers.
+/// Exact handles have narrow margins, which need more centers: a factor, and the most.
 constexpr double more_for_exact = 4.0 / 3.0;
 constexpr int most_for_exact = 2500;
 constexpr Index least_centers = 50;
@@ -56,7 +58,7 @@ LiveOptions live_options(const Options& options) {
   return live;
 }
 
-/// So many fine centers, or as many as the samples carry, and a fifth as many coarse ones.
+/// Sets the number of fine centers, limited by that of the samples, and a fifth as many coarse ones.
 void set_centers(LiveOptions& live, int centers, const SurfaceSamples& samples) {
   const Index carried = std::max(least_centers, samples.size() / samples_a_center);
   live.fine_centers = static_cast<int>(std::min<Index>(centers, carried));
@@ -64,17 +66,17 @@ void set_centers(LiveOptions& live, int centers, const SurfaceSamples& samples) 
   live.samples = std::max(live.samples, energy_samples_a_center * live.fine_centers);
 }
 
-/// The current result.
+/// Makes the field of the current state.
 using Shown = std::function<std::shared_ptr<DeformationField>()>;
 
-/// In units of the solver's energy.
+/// Bounds on the solver's energy.
 struct Bounds {
-  double worst = std::numeric_limits<double>::infinity();  ///< no preview of a result with more energy
-  double least_gain = 0.0;                                 ///< share that `steps_at_once` steps must gain
+  double worst = std::numeric_limits<double>::infinity();  ///< states of higher energy are not previewed
+  double least_gain = 0.0;  ///< least relative decrease in `steps_at_once` iterations
 };
 
-/// Solves until convergence, or until steps or time run out, or the observer ends it. The solver's energy is
-/// the loss divided by `rigidity`.
+/// Solves until convergence, until the iterations or the time budget run out, or until the observer ends it.
+/// The solver's energy is the loss divided by `rigidity`.
 LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& progress,
                const SolveHooks& hooks, double rigidity, const Shown& shown, const Bounds& bounds) {
   const int iterations = how.iterations;
@@ -199,7 +201,7 @@ std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& sampl
 Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const StylizeOptions& options,
                         const Progress& progress, const Vector& weights, const std::vector<Handle>& handles,
                         const Vec3& up, const SolveHooks& hooks) {
-  // The solver's rigidity has weight 1: all other weights are divided by the options' one.
+  // The solver's rigidity has weight 1: all other weights are divided by options.rigidity.
   LiveOptions live = live_options(options);
   live.samples = 8000;
   live.coarse_centers = 200;

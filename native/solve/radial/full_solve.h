@@ -25,10 +25,10 @@ Solution deform_radial(const SurfaceSamples& samples, const std::vector<Handle>&
                        const DeformOptions& options, const Progress& progress, const SolveHooks& hooks = {},
                        const ExactHandles* exact = nullptr);
 
-/// Options of a solve with soft handles that are met closely, so that a blend with exact ones bends little.
+/// Options of a solve whose soft handles are stiff enough that a blend with exact ones bends it little.
 DeformOptions followed_closely(DeformOptions options);
 
-/// The start for a network: deform_radial's field after some tens of steps, whatever options.field is.
+/// The start for a network: deform_radial's field after some tens of iterations, whatever options.field is.
 /// Handles are soft; the network's own blend makes them exact.
 std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& samples,
                                                      const std::vector<Handle>& handles,

@@ -8,9 +8,10 @@
 namespace arapfields {
 namespace {
 
-/// Of a line, which has no turn about itself, and of a point: a share of the inertia, and a size squared.
+/// Regularisation of the inertia tensor, which is singular for collinear points and for a single one: a
+/// fraction of the trace, and an absolute term in cube units².
 constexpr double thinnest = 1e-6, smallest = 1e-12;
-/// How far a motion may be from a rotation to be turned as one.
+/// Tolerance within which a linear map is interpolated as a rotation.
 constexpr double rotation_error = 1e-6;
 
 bool is_rotation(const Mat3& m) {

@@ -10,12 +10,13 @@
 namespace arapfields {
 namespace {
 
-/// Weight, against the surface's energy, with which a style without handles holds the lowest sample in place.
+/// Weight, relative to the surface's energy, of the fixed lowest sample of a style without handles.
 constexpr double anchor_weight = 1.0;
 
-/// A handle without a reach that has moved less, in cube units, only holds.
+/// Motion, in cube units, up to which a handle without a reach counts as an anchor.
 constexpr double hardly_moved = 1e-4;
-/// Spacing, in reaches, of the places of a handle that its reach is measured from, and their number at most.
+/// Spacing, as a fraction of the reach, of the points of a handle that distances are measured from, and their
+/// largest number.
 constexpr double place_spacing = 0.25;
 constexpr Index most_places = 256;
 
@@ -53,7 +54,7 @@ void HandleTerms::choose_pairs() {
   rows_.clear();
   held_.resize(0, 3);
   if (!any()) return choose_anchor();
-  // Some pairs of each handle, which all handles share alike.
+  // A random subset of each handle's pairs; each handle has the same total weight, times its own.
   Random random(static_cast<std::uint64_t>(problem_.options.seed), 1);
   std::vector<double> weights;
   for (Index i = 0; i < bound_.count(); ++i) {
@@ -67,7 +68,7 @@ void HandleTerms::choose_pairs() {
       weights.push_back(bound_.handle(i).weight * share);
     }
   }
-  // Samples beyond the influence, which stay where they are.
+  // Fixed samples beyond the influence.
   if (influence_) {
     const Vector share = influence_->at(problem_.surface());
     std::vector<Index> beyond;
@@ -95,8 +96,8 @@ void HandleTerms::choose_anchor() {
   reflect_pairs();
 }
 
-/// What pulls at a point pulls at its reflection as well: a symmetric field feels no difference, and the
-/// preconditioner becomes symmetric.
+/// Adds each pair's reflection, with half of the weight for both: for symmetric fields the energy is the
+/// same, and the preconditioner becomes symmetric.
 void HandleTerms::reflect_pairs() {
   if (!problem_.mirror) return;
   pairs_.sources = with_reflections(std::move(pairs_.sources));
@@ -111,7 +112,7 @@ Points HandleTerms::with_reflections(Points points) const {
   return both;
 }
 
-/// Where all handles that move have a reach, what is beyond all of these is held. Whether that has changed.
+/// Limits the influence if all handles that move have a reach. Returns whether it has changed.
 bool HandleTerms::update_influence() {
   std::shared_ptr<const Influence> next = reaches_;
   for (Index i = 0; i < bound_.count() && next; ++i) {

@@ -10,34 +10,35 @@
 
 namespace arapfields {
 
-/// Pairs of places that pull at a field: those of handles, and of what lies beyond their reach. Without
-/// handles, the lowest sample alone is held. With a symmetry, each pair's reflection as well.
+/// The source–target pairs of the handle energy Σ weight ‖f(source) − target‖²: of handles, and fixed samples
+/// beyond their reach. Without handles, the lowest sample alone is fixed. With a symmetry, each pair has its
+/// reflection.
 class HandleTerms {
  public:
   explicit HandleTerms(const RadialProblem& problem) : problem_(problem) {}
   /// Handles in mesh coordinates. Throws InvalidInput that names the handle which does not fit.
   void set(const std::vector<Handle>& handles);
   void set_targets(const std::vector<Handle>& moved);
-  /// Where a figure's head is: without handles, what lies lowest against it is held.
+  /// The upward direction that defines the lowest sample.
   void set_up(const Vec3& up);
 
   bool any() const { return !handles_.empty(); }
   const std::vector<Handle>& handles() const { return handles_; }
   const BoundHandles& bound() const { return bound_; }
   const HandleBatch<double>& pairs() const { return pairs_; }
-  /// The first of the pairs, which are the handles' own; without handles all of them.
+  /// Number of the handles' own pairs, which come first; without handles, of all pairs.
   Index own_count() const { return any() ? static_cast<Index>(rows_.size()) : pairs_.sources.rows(); }
-  /// Which handle each of its own pairs is of.
+  /// The handle of one of these pairs.
   Index handle_of(Index pair) const;
-  /// The pairs' targets where the handles have moved so.
+  /// The pairs' targets for these motions of the handles.
   Points targets_at(const std::vector<Mat4>& motions) const;
-  /// How far the motion reaches; null: everywhere.
+  /// Limit of the deformation to the handles' reach; null: none.
   const std::shared_ptr<const Influence>& influence() const { return influence_; }
   /// Values of the basis functions (pairs, size) at the pairs' sources.
   const RowMatrix<double>& basis_values();
-  /// Of parts of the surface that no pair is in.
+  /// Links of the parts of the surface without pairs.
   const PartLinks& links();
-  /// Of the pairs' sources and weights; targets move without it.
+  /// Revision of the pairs' sources and weights, not of the targets.
   Revision revision() const { return revision_; }
 
  private:
@@ -53,9 +54,9 @@ class HandleTerms {
   BoundHandles bound_;
   Vec3 up_ = Vec3::UnitZ();
   std::shared_ptr<const Influence> reaches_;    // of handles that have a reach; null: none has
-  std::shared_ptr<const Influence> influence_;  // these, unless a handle without a reach has moved
-  std::vector<Index> rows_;                     // rows of bound_ that pull
-  Points held_;                                 // samples beyond the influence, which are held in place
+  std::shared_ptr<const Influence> influence_;  // reaches_, or null if a handle without a reach has moved
+  std::vector<Index> rows_;                     // rows of bound_ that are pairs
+  Points held_;                                 // fixed samples beyond the influence
   HandleBatch<double> pairs_;
   Dependent<RowMatrix<double>, 1> basis_values_;
   Dependent<PartLinks, 1> links_;

@@ -9,8 +9,8 @@
 
 namespace arapfields {
 
-/// What a caller adds to a solve: energies at its samples, and an observer. The observer gets the weighted
-/// terms after each step; it ends the solve by returning false.
+/// Optional additions to a solve: external energies at its samples, and an observer, which gets the weighted
+/// terms after each iteration and ends the solve by returning false.
 struct RadialHooks {
   ExternalEnergies energies;
   double weight = 1.0;  ///< of the energies

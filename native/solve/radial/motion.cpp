@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Secondary motion: steps of a RadialSolver in time.
+// Secondary motion: implicit time integration of a RadialSolver's surface.
 #include <algorithm>
 #include <cmath>
 
@@ -15,36 +15,36 @@
 namespace arapfields {
 namespace {
 
-/// Share of its amplitude that an oscillation too fast for the steps keeps: the ringing after a jump of the
-/// handles ends soon, and slower oscillations lose next to nothing.
+/// Spectral radius of the generalised-α method at infinite frequency: the factor on the amplitude a step. It
+/// damps the ringing after a jump of the handles, and resolved oscillations hardly at all.
 constexpr double kept_of_fast = 0.7;
 constexpr TimeScheme usual = TimeScheme::generalised_alpha(kept_of_fast);
 
-/// The solve of a usual step ends where a further one would gain less than the first share of the kinetic
-/// energy. It grows as the square of the step's length, up to the second. Single precision resolves the
-/// third and fourth.
+/// A solve ends when a further iteration would gain less than `motion_share` of the kinetic energy, for steps
+/// of `usual_step`; the fraction grows with the square of the step, up to `largest_share`. The relative
+/// tolerance and the absolute floor are what single precision resolves.
 constexpr double motion_share = 3e-4, largest_share = 1e-2, motion_tolerance = 3e-5, motion_floor = 1e-10;
-/// Factor on the iterations of the first step from rest, whose acceleration is not known.
+/// Factor on the iterations of the first step from rest, which has no initial acceleration to predict with.
 constexpr Index first_iterations = 4;
-/// Largest correction of a step that was not solved to its end, as a share of the step.
+/// Largest correction by remaining_step().
 constexpr double most_left = 0.1;
 
-/// Solves of a step at most, beside the first, while what touches is deep, or while more than this share of
-/// the pressures changes: those of the step before hold the impulse of a fall, which would throw a body up
-/// again.
+/// Augmented-Lagrangian rounds of a step at most, beside its first solve, while points penetrate or the
+/// pressures' relative change is at least `unsettled`: pressures of the step before may hold the impulse of
+/// an impact, which would make a body bounce.
 constexpr Index contact_rounds = 8;
 constexpr double unsettled = 0.2;
 
-/// Limits of a frame in seconds.
+/// Bounds of a frame's length, in seconds.
 constexpr double shortest_frame = 1e-5, longest_frame = 10.0;
 
-/// How far a motion of the coordinates may be from a rigid one.
+/// Tolerance of ‖RᵀR − I‖ for a change of coordinates.
 constexpr double rigid_error = 1e-6;
 
-/// The nearest power of two: frames of much the same length share a factored preconditioner.
+/// The nearest power of two, so that frames of similar length share a factored preconditioner.
 double rounded(double inertia) { return std::exp2(std::round(std::log2(inertia))); }
 
-/// Takes the surface of a solver through a frame, in steps of equal length.
+/// Integrates the surface of a solver over a frame, in time steps of equal length.
 class TimeIntegrator {
  public:
   TimeIntegrator(RadialState& state, double seconds);
@@ -57,11 +57,11 @@ class TimeIntegrator {
 
   RadialState& state_;
   SurfaceDynamics& body_;
-  std::vector<Mat4> before_;  // motions of the handles where the frame starts
+  std::vector<Mat4> before_;  // motions of the handles at the start of the frame
   Index steps_;
-  double h_;       // seconds of a step
-  double drag_;    // a second
-  Twist carried_;  // what the handles carry along, which the drag does not slow
+  double h_;       // time step, seconds
+  double drag_;    // viscous damping per mass, 1/second
+  Twist carried_;  // the handles' mean rigid velocity; drag acts on velocities relative to it
 };
 
 TimeIntegrator::TimeIntegrator(RadialState& state, double seconds)
@@ -117,7 +117,7 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
   const RowMatrix<double> q = coefficients, v = body_.velocities;
   RowMatrix<double> a = RowMatrix<double>::Zero(q.rows(), 3);
   if (scheme == usual) a = body_.accelerations;
-  // Predict: where a' = 0 leads, and the known terms of mass a' = force.
+  // Predict: the position for a' = 0, and the explicit terms of the equation of motion.
   const double unit = scheme.reach() * h_ * h_;
   const double inert = scheme.inert(drag_ * h_), inertia = body_.mass() * inert / unit;
   const RowMatrix<double> ahead = q + w * h_ * (v + (0.5 - beta) * h_ * a);
@@ -128,7 +128,7 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
   objective.set_body(
       body_.inertia_terms<float>(inertia, objective.sample_values_of(ahead - unit / inert * known)));
   stiffen_contact(state_);
-  // Solve, starting where the known acceleration leads.
+  // Solve, starting from the prediction with the last acceleration.
   coefficients = ahead + unit * a;
   ++state_.shape.revision;
   const double share = std::min(largest_share, motion_share * std::pow(h_ / usual_step, 2.0));
@@ -146,13 +146,13 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
         {state_.problem.options.iterations, motion_tolerance, share * state_.report.kinetic + motion_floor},
         progress);
   }
-  // A surface that touches ends its steps on the planes, at the cost of energy.
+  // A step with active contact is left to backward Euler, whose impacts are inelastic.
   if (scheme != TimeScheme::backward_euler() && (would_press(state_) || !state_.report.converged)) {
     coefficients = q;
     state_.set_measurements(state_.fast, u);
     return false;
   }
-  // Update place, velocity and acceleration.
+  // Update position, velocity and acceleration.
   const VectorF du = state_.measurements(state_.fast) - u;
   const double further = 1.0 + remaining_step(du, inertia);
   const RowMatrix<double> way = further * (coefficients - q), next = (q + way - ahead) / unit;
@@ -170,8 +170,8 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
   return true;
 }
 
-/// The share by which to lengthen a step `du` so that the remaining gradient does no work on it: a solve that
-/// ends early then neither adds nor takes energy.
+/// The relative change of a step `du` for which the remaining gradient does no work along it, so that a solve
+/// that ends early neither adds nor dissipates energy; 0 if it is no small correction.
 double TimeIntegrator::remaining_step(const VectorF& du, double inertia) const {
   const RadialObjective<float>& objective = *state_.fast.objective.latest();
   VectorF cotangents;
@@ -180,10 +180,10 @@ double TimeIntegrator::remaining_step(const VectorF& du, double inertia) const {
   const double curvature =
       inertia * body_.masses().dot(way.rowwise().squaredNorm()) / static_cast<double>(way.rows());
   const double share = -cotangents.cast<double>().dot(du.cast<double>()) / curvature;
-  return std::abs(share) < most_left ? share : 0.0;  // else it is no small correction
+  return std::abs(share) < most_left ? share : 0.0;
 }
 
-/// The root mean square of the samples' velocities becomes the report's speed.
+/// Sets the report's speed as well.
 double TimeIntegrator::kinetic_energy() {
   const RadialObjective<float>& objective = *state_.fast.objective.latest();
   VectorF u;
@@ -193,7 +193,7 @@ double TimeIntegrator::kinetic_energy() {
   return body_.kinetic_energy(v);
 }
 
-/// The surface and the handles of the last step in coordinates that have moved.
+/// Expresses the state of the last step in new coordinates, which a rigid motion (cube coordinates) leads to.
 void change_coordinates(RadialState& s, const Mat4& motion) {
   const Mat3 turn = motion.topLeftCorner<3, 3>();
   require(motion.allFinite() && motion.row(3) == Eigen::RowVector4d(0, 0, 0, 1) && turn.determinant() > 0.0 &&

@@ -9,7 +9,7 @@
 namespace arapfields {
 namespace {
 
-/// Pull of each bump's coefficient towards zero: removes what no sample can see, and no more.
+/// Weight of the ridge on the centers' coefficients: removes components that vanish at all samples.
 constexpr double coefficient_weight = 1e-10;
 
 }  // namespace

@@ -17,19 +17,19 @@
 namespace arapfields {
 
 /// mean (stretch + λ·bend) + weight·handles + links + λ_Gauss·gauss + stance + barrier + body + contact +
-/// external + a vanishing pull of all centers towards zero, of the fields of one radial basis. Measurements:
-/// jets at the energy samples, values at the handles' sources, links, centers, values in contact. In single
-/// precision a step costs half, and the value is good to some 1e-6 of itself.
+/// external + a tiny ridge on the coefficients, of the fields of one radial basis. Measurements: jets at the
+/// energy samples, values at the handles' sources, links, center coefficients, values at contact points. In
+/// single precision an iteration costs half, and the value has a relative error of about 1e-6.
 template <class Scalar>
 class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
  public:
   using Measurements = Eigen::VectorX<Scalar>;
 
-  /// For the energy samples that the problem has now.
+  /// For the current energy samples of the problem.
   explicit RadialObjective(const RadialProblem& problem);
   /// λ of each sample (n), and its factor on its energy (n; empty: all 1).
   void set_stiffness(const Vector& bending, const Vector& weights);
-  /// Pairs that pull, the values of the basis functions at their sources, and links of parts without any.
+  /// Handles' pairs, the basis functions' values at their sources, and links of parts without pairs.
   void set_handles(const HandleBatch<double>& pairs, const RowMatrix<double>& basis_values,
                    const PartLinks& links);
   void set_targets(PointsIn targets);
@@ -37,17 +37,17 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   void set_preconditioner(const TallMatrix<float>& inverse_factor) { inverse_factor_ = &inverse_factor; }
   void set_style(std::optional<StyleTerm<Scalar>> style) { style_ = std::move(style); }
   void set_stance(std::optional<StanceTerm<Scalar>> stance) { stance_ = std::move(stance); }
-  /// What a body with mass feels; none: the solve is one of shapes alone.
+  /// Inertial terms of a time step; none: the solve is quasi-static.
   void set_body(std::optional<Body<Scalar>> body) { body_ = std::move(body); }
   void set_hooks(const RadialHooks& hooks) { hooks_ = hooks; }
-  /// The planes that the surface is kept beyond; borrowed. Measurements of others fit after
-  /// measure_contact().
+  /// The contact planes; borrowed. Measurements with an earlier set need measure_contact() before their next
+  /// use.
   void set_contact(const ContactSet& contact);
   void measure_contact(const RowMatrix<double>& c, Measurements& u) const;
   void set_contact_stiffness(ContactStiffness stiffness) { contact_stiffness_ = std::move(stiffness); }
 
   RadialTerms terms(const Measurements& u) const { return evaluate(u, nullptr); }
-  /// What `call` makes of the jets of f at the samples.
+  /// Returns call(jets), with the jets of f at the energy samples.
   template <class Call>
   auto with_jets(const Measurements& u, Call&& call) const {
     if (blend_.empty()) return call(JetView<const Scalar>{u.data(), samples_.size(), JetOrder::second});
@@ -56,30 +56,31 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
     blend_.add_fixed(jets);
     return call(JetView<const Scalar>(jets));
   }
-  /// Where the samples are.
+  /// f at the energy samples (n,3).
   PointsOf<Scalar> sample_values(const Measurements& u) const {
     return with_jets(u, [](JetView<const Scalar> jets) {
       return PointsOf<Scalar>(Eigen::Map<const PointsOf<Scalar>>(jets.data, jets.count, 3));
     });
   }
-  /// Where the field with these coefficients takes them; without a blend.
+  /// The same for a field with these coefficients, without the blend of exact handles.
   PointsOf<Scalar> sample_values_of(const RowMatrix<double>& c) const;
-  /// Where the pairs' sources are.
+  /// f at the pairs' sources.
   Eigen::Map<const PointsOf<Scalar>> handle_values(const Measurements& u) const {
     return {u.data() + handle_offset(), pairs_.sources.rows(), 3};
   }
-  /// Where the places of the contact are.
+  /// f at the contact points.
   Eigen::Map<const PointsOf<Scalar>> contact_values(const Measurements& u) const {
     return {u.data() + contact_offset(), contact_.size(), 3};
   }
 
-  /// Twice the weights of mean (‖J‖² + λ‖D‖²) + weight·handles, which precondition() inverts, times u.
+  /// The Hessian, with respect to measurements, of the quadratic model mean (‖J‖² + λ‖D‖²) + weight·handles,
+  /// times u; precondition() approximates the inverse of its pull-back.
   Measurements weighted(const Measurements& u) const;
 
   void measure(const RowMatrix<double>& c, Measurements& u) const override;
   double value(const Measurements& u, Measurements* cotangents) const override;
   RowMatrix<double> pull_back(const Measurements& cotangents) const override;
-  RowMatrix<double> pull_back_contact(const PointsOf<Scalar>& cotangents) const;  ///< from its places alone
+  RowMatrix<double> pull_back_contact(const PointsOf<Scalar>& cotangents) const;  ///< of contact points alone
   RowMatrix<double> precondition(const RowMatrix<double>& gradient) const override;
   double first_trial(const Measurements& u, const Measurements& du, double slope) const override;
   bool accepted(const Measurements& u) const override;
@@ -96,7 +97,7 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   double barrier() const {
     return std::max(problem_.options.surface.barrier, contact_.size() > 0 ? contact_barrier : 0.0);
   }
-  static constexpr double contact_barrier = 10.0;  ///< handles that pull into an obstacle fold no surface
+  static constexpr double contact_barrier = 10.0;  ///< least weight of the fold barrier in contact
 
   const RadialProblem& problem_;
   RadialEvaluator<Scalar> samples_;

@@ -11,7 +11,7 @@
 namespace arapfields {
 namespace {
 
-/// The weight of a link against the surface's energy: no less than what single precision can tell of it.
+/// Weight of a link's energy against the surface's: small, but resolved in single precision.
 constexpr double link_weight = 3e-4;
 
 }  // namespace

@@ -5,22 +5,23 @@
 
 namespace arapfields {
 
-/// What keeps parts of a surface that nothing holds beside those that are held. The energy of a link: how far
-/// its second place is from where the field near the first one would take it, in lengths of the link, and how
-/// unlike the field's slopes are at both; motions of both as one cost nothing. A part's own energy does not
-/// feel how it lies to others: without links, rounding would decide.
+/// Links from disconnected parts of a surface without handles to the nearest parts that are held, a minimum
+/// spanning forest. The energy of a link from x to y = x + d is ‖f(y) − f(x) − J(x) d‖²/‖d‖² + ‖J(y) −
+/// J(x)‖²; it is 0 for a common affine motion. A part's own energy does not depend on its position relative
+/// to the others: without links, rounding would determine it.
 class PartLinks {
  public:
   PartLinks() = default;
-  /// `held` (n,3) are the places that something pulls at. Links avoid what exact handles decide.
+  /// `held` (n,3) are the sources of handles' pairs. Links do not end in the boxes of exact handles.
   PartLinks(const RadialProblem& problem, Points held);
 
-  /// The places of the links (n,3 each).
+  /// The ends of the links (n,3 each).
   const Points& from() const { return from_; }
   const Points& to() const { return to_; }
-  /// (4 n, 3) Numbers whose squares add up to the energy, from a field's jets of first order (4 n, 3).
+  /// Residuals (4 n, 3), whose squares sum to the energy, from a field's first-order jets (4 n, 3) at the
+  /// ends.
   RowMatrix<double> values(const RowMatrix<double>& at_from, const RowMatrix<double>& at_to) const;
-  /// (4 n, basis) These numbers of the basis functions.
+  /// Residuals (4 n, size) of the basis functions.
   const RowMatrix<double>& rows() const { return rows_; }
 
  private:

@@ -8,11 +8,12 @@
 namespace arapfields {
 namespace {
 
-/// Samples × centers below which a step takes about a millisecond: waking other threads, which may be busy
-/// with drawing, would cost more than they do.
+/// Samples × centers below which a solve is single-threaded: an iteration then takes about a millisecond, and
+/// waking threads costs more than they save.
 constexpr Index worth_threads = 1000000;
-/// Fine centers from which a second layer pays in live solves (docs/notes/centers.md). Fewer are wider than
-/// the layers are apart: functions that are nearly dependent, and solves that take half as many steps again.
+/// Least number of fine centers for a second layer in live solves (docs/notes/centers.md). With fewer, basis
+/// functions are wider than the distance of the layers and nearly dependent: solves take 1.5 times as many
+/// iterations.
 constexpr int worth_two_layers = 400;
 
 }  // namespace
@@ -28,7 +29,7 @@ RadialProblem::RadialProblem(const SurfaceSamples& surface, const LiveOptions& s
   if (axis >= 0) samples = across(samples, axis);
   require_samples(samples);
   const auto seed = static_cast<std::uint64_t>(options.seed);
-  // Deform and stylize, which hand a shape in, need the field off the surface as well.
+  // Deform and stylize, which pass a shape in, evaluate the field off the surface as well.
   const bool two_layers = shape || options.fine_centers >= worth_two_layers;
   if (!shape) shape = std::make_shared<const RestShape>(samples, options.interior, seed, progress, axis);
   Random random(seed);

@@ -17,8 +17,8 @@
 
 namespace arapfields {
 
-/// What a RadialSolver solves on: the surface, the basis of its fields, and the samples that the energy is
-/// evaluated at. All in cube coordinates.
+/// The discretisation of a RadialSolver: the surface, the basis of its fields, and the samples at which the
+/// energy is evaluated. In cube coordinates.
 struct RadialProblem {
   /// `rest_shape` and `exact_handles` may be null. Throws InvalidInput for samples that cannot be used.
   RadialProblem(const SurfaceSamples& surface, const LiveOptions& solver_options, const Progress& progress,
@@ -32,15 +32,15 @@ struct RadialProblem {
   int solve_threads() const;
 
   LiveOptions options;
-  SurfaceSamples samples;  ///< with symmetry, in a frame whose center is on the plane
+  SurfaceSamples samples;  ///< with symmetry, in a frame whose center is on the symmetry plane
   std::shared_ptr<const RestShape> shape;
   std::shared_ptr<const HandleBlend> blend;  ///< null: handles are soft
-  std::optional<Mirror> mirror;              ///< where the field is symmetric
+  std::optional<Mirror> mirror;              ///< of symmetric fields
   RadialBasis basis;
   SurfaceStiffness stiffness;         ///< λ without the samples' own bend weights
   std::vector<Index> energy_samples;  ///< rows of the samples
-  Points energy_points;               ///< their places
-  Revision energy_revision = 0;       ///< of these two
+  Points energy_points;               ///< (n,3) positions of the energy samples
+  Revision energy_revision = 0;       ///< of the energy samples
 };
 
 }  // namespace arapfields

@@ -14,14 +14,14 @@
 namespace arapfields {
 namespace {
 
-/// Single precision serves down to this tolerance; what it cannot see is an energy of about the second
-/// number.
+/// Smallest tolerance of solves in single precision, and the absolute energy that it resolves.
 constexpr double single_tolerance = 3e-5, single_floor = 1e-10;
 
-/// Share of the handles' part of the energy below which a rigid motion of everything must bring it.
+/// A rigid motion is applied if it reduces the handles' energy to at most this fraction.
 constexpr double worthwhile_gain = 0.1;
 
-/// Where handles moved together, the whole shape moves along first: no energy but theirs feels it.
+/// Moves the whole shape by the best rigid alignment with the targets: only the handles' energy depends on
+/// it.
 void follow_rigidly(RadialState& s) {
   const HandleBatch<double>& pairs = s.handles.pairs();
   const VectorF& u = s.measurements(s.fast);
@@ -34,7 +34,7 @@ void follow_rigidly(RadialState& s) {
   s.shape.jump();
 }
 
-/// Without contact.
+/// A solve without contact.
 void follow_freely(RadialState& s, Index iterations, double tolerance, const Progress& progress) {
   s.precondition(0.0);
   s.objective(s.fast);
@@ -44,18 +44,17 @@ void follow_freely(RadialState& s, Index iterations, double tolerance, const Pro
   const bool ended = s.descend(s.fast, single, progress).ended;
   const bool is_exact = tolerance < single_tolerance;
   if (is_exact) {
-    ++s.shape.revision;  // measured afresh in double precision, and by the next solve in single
+    ++s.shape.revision;  // measurements are recomputed in double precision, and in the next solve's single
     s.objective(s.exact);
     if (s.report.iterations < iterations && !ended)
       s.descend(s.exact, {iterations - s.report.iterations, tolerance}, progress);
   }
-  // A difference of measurements taken at two times has their rounding errors, which an extrapolation adds
-  // anew in each solve.
+  // Recomputed measurements differ from updated ones by rounding errors, which extrapolation would amplify.
   if (is_exact || s.fast.uses == 0) start.u.resize(0);
   s.history.start.set(s.start_revisions(), std::move(start));
 }
 
-/// No energy of ours feels a translation: what is left of one is taken out exactly.
+/// Translates the field so that the fixed sample's error is 0; no other term depends on translations.
 void anchor_lowest_point(RadialState& s) {
   const Points& sources = s.handles.pairs().sources;
   Points value(1, 3);

@@ -20,13 +20,13 @@ class HandleBlend;
 struct RadialState;
 struct RestShape;
 
-/// Minimises the energy of deform and stylize over radial fields. Each solve starts from the shape of the
-/// last one, so that a drag runs at interactive rates. For one thread at a time.
+/// Minimises the energy of deform and stylize over radial fields, by preconditioned L-BFGS. Each solve starts
+/// from the shape of the last one, for drags at interactive rates. For one thread at a time.
 class ARAPFIELDS_EXPORT RadialSolver {
  public:
   /// Handles are in mesh coordinates; a style needs none. Solvers on the same samples may share their `shape`
-  /// (solve/radial/rest_shape.h). With a blend (solve/radial/blend.h), the unknown is the radial field inside
-  /// it. Throws InvalidInput as deform does.
+  /// (solve/radial/rest_shape.h). With a blend (solve/radial/blend.h), the radial field inside it is solved
+  /// for. Throws InvalidInput as deform does.
   RadialSolver(const SurfaceSamples& samples, const std::vector<Handle>& handles, const LiveOptions& options,
                const Progress& progress = {}, std::shared_ptr<const RestShape> shape = nullptr,
                std::shared_ptr<const HandleBlend> blend = nullptr);
@@ -43,14 +43,14 @@ class ARAPFIELDS_EXPORT RadialSolver {
   void clear_style();
   /// Other weights of the samples (mesh/surface_samples.h). The preconditioner is factored anew.
   void set_weights(const Vector& weights, const Vector& bend_weights = {});
-  /// Makes the field symmetric across a plane through the origin of mesh coordinates, or no longer so. The
-  /// next solve starts from the symmetric shape that is nearest.
+  /// Makes the field symmetric across a plane through the origin of mesh coordinates, or not. The next solve
+  /// starts from the nearest symmetric shape.
   void set_symmetry(SymmetryPlane symmetry, const Progress& progress = {});
   /// Energies that join the solver's own, and an observer of its steps.
   void set_hooks(const RadialHooks& hooks);
-  /// What the surface does not pass from the next solve on; none: nothing. Throws InvalidInput as
-  /// require_contact() does, and with exact handles; Cancelled, and then nothing has changed. `in_one_go`:
-  /// handles jump to where they end, so that a solve takes them there in small steps where a drag would have.
+  /// Sets the contact constraints of later solves; none: no contact. Throws InvalidInput as require_contact()
+  /// does, and with exact handles; Cancelled, without any change. `in_one_go`: targets jump to their final
+  /// positions, unlike in a drag, so that a solve may try smaller steps towards them.
   void set_contact(const std::optional<Contact>& contact, bool in_one_go = false,
                    const Progress& progress = {});
   /// Moves the handles' targets.
@@ -63,31 +63,31 @@ class ARAPFIELDS_EXPORT RadialSolver {
   /// Gives the surface a mass from the next step on; none, or strength 0: no mass. solve() finds the
   /// equilibrium. Throws InvalidInput for numbers out of range, and if all masses are zero.
   void set_secondary_motion(const std::optional<SecondaryMotion>& motion, const Progress& progress = {});
-  /// Moves the handles to other targets in so many seconds (1e-5 to 10), and the surface with them. It starts
-  /// where the last step or solve ended; a solve ends with zero velocity. `coordinates` takes coordinates of
-  /// the last step to those of this one, where the object itself has moved rigidly: the surface feels it.
-  /// Without a mass: set_targets() and solve(). If it throws, nothing has moved.
+  /// Integrates the motion over a frame of this length in seconds (1e-5 to 10), in which the handles move to
+  /// other targets. It starts at the end of the last step or solve; a solve ends with zero velocity.
+  /// `coordinates` maps coordinates of the last step to those of this one, if the object itself has moved
+  /// rigidly. Without a mass: set_targets() and solve(). If it throws, the state is unchanged.
   std::shared_ptr<RadialField> step(const std::vector<Handle>& moved, double seconds,
                                     const Progress& progress = {},
                                     const Mat4& coordinates = Mat4::Identity());
-  /// The state that the next step starts from. The same steps from the same state are equal bit for bit.
+  /// The state that the next step starts from. Equal steps from equal states give bit-identical results.
   MotionState motion_state() const;
   void set_motion_state(const MotionState& state);
   /// Back to the identity, and the handles' targets to rest.
   void reset();
-  /// Starts the next solve from another field's shape, as nearly as the solver's basis can have it.
+  /// Starts the next solve from a least-squares fit of another field.
   void adopt(const DeformationField& field);
 
   /// The number of samples at which the field folds. If there are any, these and the nearly folded ones join
   /// the samples of the energy, and the fold barrier gets this weight.
   Index add_fold_samples(double barrier);
 
-  /// Points (n,3) of mesh coordinates that tracked() moves at little cost.
+  /// Points (n,3) in mesh coordinates at which tracked() evaluates the field, with precomputed basis values.
   void track(PointsIn points);
   PointsF tracked() const;
 
   std::shared_ptr<RadialField> field() const;
-  /// Of the last solve. After follow() the first call measures it, against the current targets.
+  /// The report of the last solve. After follow() the first call measures it, against the current targets.
   const RadialReport& report() const;
   const std::vector<Handle>& handles() const;
 

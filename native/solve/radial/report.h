@@ -12,15 +12,15 @@
 
 namespace arapfields {
 
-/// What a solve reached, measured at its own samples. The stretch and the energy are pure numbers, the bend
-/// is in 1/cube units², lengths are in mesh units.
+/// Energies and errors after a solve, at its energy samples. The stretch and the energy are pure numbers, the
+/// bend is in 1/cube units², lengths are in mesh units.
 struct RadialReport {
   ArapValue arap;            ///< arap.energy with the samples' own stiffness
-  double value = 0.0;        ///< all that is minimised
+  double value = 0.0;        ///< the objective
   double handle_mean = 0.0;  ///< distance to the targets
   double handle_max = 0.0;
   std::optional<double> preference;  ///< preference_of() a style, where there is one
-  double kinetic = 0.0;              ///< energy of the motion, in the unit of `value`; 0 after a solve
+  double kinetic = 0.0;              ///< kinetic energy, in the unit of `value`; 0 after a solve
   double speed = 0.0;                ///< root mean square over the samples, mesh units a second
   Distortion distortion;
   ContactReport contact;

@@ -11,9 +11,10 @@ namespace arapfields {
 namespace {
 
 constexpr Index most_sites = 6000;
-/// Centers stand as densely as the root of the thickness asks, down to this share of its median.
+/// Centers' spacing is proportional to the square root of the thickness, clamped below at this fraction of
+/// its median.
 constexpr double least_size = 0.1;
-/// Of the seed's random numbers, those for sites.
+/// The random stream that chooses the sites.
 constexpr std::uint64_t stream = 2;
 
 }  // namespace

@@ -15,36 +15,36 @@
 
 namespace arapfields {
 
-/// What a surface's samples tell solvers before any handle: found once, and shared by all that solve on them.
-/// In the samples' cube.
+/// Precomputed data of a rest surface that do not depend on handles, shared by all solvers on the same
+/// samples. In cube coordinates.
 struct RestShape {
-  /// `interior`: whether ways through the interior are looked for; `axis`: 0, 1 or 2 where fields are to be
-  /// symmetric across the plane on which that coordinate is 0. Throws InvalidInput for no samples and for NaN
-  /// or infinity among them, Cancelled. `may_join` is of samples, as interior_embedding() has it.
+  /// `interior`: whether to compute the interior embedding; `axis`: 0, 1 or 2 for fields that are symmetric
+  /// across the plane where that coordinate is 0, −1 for others. `may_join` is that of interior_embedding(),
+  /// for samples. Throws InvalidInput for no samples and for NaN or infinity among them, Cancelled.
   RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t seed, const Progress& progress,
             int axis = -1, const MayJoin& may_join = {});
 
-  /// What contact follows of these samples, chosen when it is first asked for. Throws Cancelled.
+  /// The contact points of these samples, chosen at the first call. Throws Cancelled.
   std::shared_ptr<const FollowedPlaces> followed(const SurfaceSamples& samples,
                                                  const Progress& progress) const;
 
-  std::vector<std::uint32_t> order;  ///< the samples, neighbours beside each other
+  std::vector<std::uint32_t> order;  ///< spatially coherent permutation of the samples (canonical_order)
   std::shared_ptr<const LocalThickness> thickness;
-  Points sites;              ///< (n,3) samples that centers are chosen from; folded where there is an axis
-  RadialLayout layout;       ///< how dense centers stand there, and what is below
-  std::vector<Index> parts;  ///< parts_of() the sites
-  std::shared_ptr<const InteriorEmbedding> embedding;  ///< null where straight distances serve
+  Points sites;              ///< (n,3) candidates for centers; with an axis, reflected to one side
+  RadialLayout layout;       ///< relative spacing of centers at the sites, and points below them
+  std::vector<Index> parts;  ///< connected part of each site, as parts_of()
+  std::shared_ptr<const InteriorEmbedding> embedding;  ///< null: Euclidean distances are used
 
  private:
   std::uint64_t seed_;
   mutable OneAtATime<std::shared_ptr<const FollowedPlaces>> followed_;
 };
 
-/// 0, 1 or 2; −1 for none.
+/// The axis of a symmetry plane's normal: 0, 1 or 2; −1 for none.
 inline int axis_of(SymmetryPlane plane) { return static_cast<int>(plane) - 1; }
 
-/// The samples in a frame whose center lies on the plane of mesh coordinates where one of them is 0: there a
-/// reflection across it changes a sign and rounds nothing.
+/// The samples in a frame whose center lies on the plane where the mesh coordinate `axis` is 0, so that in
+/// the cube a reflection across it is an exact change of sign.
 inline SurfaceSamples across(const SurfaceSamples& samples, int axis) {
   SurfaceSamples result = samples;
   result.points.col(axis).array() += samples.frame.center[axis] / samples.frame.scale;

@@ -13,37 +13,37 @@ namespace arapfields {
 struct SecondaryMotion {
   SecondaryMotionOptions options;
   Vector masses = {};                 ///< of the surface samples, relative, none negative; empty: all 1
-  Vec3 up = Vec3::UnitZ();            ///< against the gravity
+  Vec3 up = Vec3::UnitZ();            ///< opposite to gravity
   std::optional<double> ground = {};  ///< height along `up`, in mesh coordinates; none: no ground
 };
 
-/// How a surface presses on obstacles, and where these are.
+/// The contact state between two time steps: obstacles' placements, multipliers, and points' sides.
 struct ContactState {
-  std::vector<Mat4> placements;  ///< of the functions' cubes, in the surface's
+  std::vector<Mat4> placements;  ///< from the functions' cubes to the surface's
   struct Pressure {
     Index row;
     Index surface;
     double pressure;
-    Vec3 anchor;  ///< where friction holds it
+    Vec3 anchor;  ///< of friction
   };
-  std::vector<Pressure> pressures;  ///< of what touches
+  std::vector<Pressure> pressures;  ///< the positive ones
   struct Inside {
     Index row;
     Index surface;
     Vec3 seen;
-    double clear;  ///< distance there; −∞: it stays inside, where an obstacle crosses the surface
+    double clear;  ///< distance at `seen`; −∞: left inside, where an obstacle crosses the surface
   };
-  std::vector<Inside> inside;  ///< where what may be inside was last seen outside
-  /// Of each surface, the samples that it crosses at or beside; empty: none.
+  std::vector<Inside> inside;  ///< last outside positions of points that may be inside
+  /// For each surface, whether it crosses the shape at or beside each sample; empty: nowhere.
   std::vector<std::vector<bool>> crossed;
 };
 
-/// Where a body is and how it moves: all that the next step depends on beside its handles' targets.
+/// Position and velocity of a surface: all that the next time step depends on, beside the handles' targets.
 struct MotionState {
   RowMatrix<double> coefficients;   ///< (size,3) of the radial basis
-  RowMatrix<double> velocities;     ///< (size,3) of these, a second
-  RowMatrix<double> accelerations;  ///< (size,3), a second²; empty: not known
-  std::vector<Mat4> motions;        ///< of the handles, in cube coordinates; empty: not known
+  RowMatrix<double> velocities;     ///< (size,3) of the coefficients, 1/second
+  RowMatrix<double> accelerations;  ///< (size,3), 1/second²; empty: unknown
+  std::vector<Mat4> motions;        ///< of the handles, in cube coordinates; empty: unknown
   ContactState contact = {};
 };
 

@@ -10,9 +10,9 @@
 namespace arapfields {
 namespace {
 
-/// Solves after which measurements that were only updated are taken afresh.
+/// Solves after which incrementally updated measurements are recomputed.
 constexpr int most_uses = 16;
-/// Values in single precision are good to about this share.
+/// Relative error of the objective in single precision.
 constexpr double single_error = 1e-6;
 
 }  // namespace
@@ -37,7 +37,7 @@ void RadialState::precondition(double inertia) {
       [&] { return factor(inertia); });
 }
 
-/// Adds rows of values, with their reflections, to the sum of weighted squares that is factored.
+/// Assembles the quadratic model of stiffness, handles, links, stance and inertia, and inverts its factor.
 TallMatrix<float> RadialState::factor(double inertia) {
   ++preconditioner.revision;
   RowMatrix<double> values = handles.basis_values();
@@ -118,7 +118,7 @@ SolveHistory::Start RadialState::extrapolate() {
   if (const Index size = std::min(now.u.size(), before.u.size()); size > 0) {
     further = now.u;
     further.head(size) = 2.0f * now.u.head(size) - before.u.head(size);
-    objective.measure_contact(2.0 * now.coefficients - before.coefficients, further);  // of other planes
+    objective.measure_contact(2.0 * now.coefficients - before.coefficients, further);  // the set has changed
   } else {
     objective.measure(now.coefficients - before.coefficients, further);
     further += now.u;
@@ -139,7 +139,7 @@ QuasiNewtonReport RadialState::descend(RadialPrecision<Scalar>& precision, const
        dynamics.revision(), shape.jumps, contact.found().revision},
       [] { return QuasiNewton(); });
   Eigen::VectorX<Scalar> u = precision.u.take(measured_revisions());
-  ++shape.revision;  // at once: cancelled between two steps, the coefficients have gone on
+  ++shape.revision;  // before minimise(), which has changed the coefficients if it throws Cancelled
   const QuasiNewtonReport found =
       optimizer.minimise(*precision.objective.latest(), how, shape.coefficients, u, progress);
   if (++precision.uses >= most_uses)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a RadialSolver consists of. Each part owns its data and says by a revision when it has changed.
+// The state of a RadialSolver. Each part owns its data; its revision changes with them.
 #pragma once
 
 #include <memory>
@@ -19,7 +19,7 @@ namespace arapfields {
 struct RadialShape {
   RowMatrix<double> coefficients;
   Revision revision = 0;  ///< of the coefficients
-  Revision jumps = 0;     ///< changes that no solve made, of which past solves know nothing
+  Revision jumps = 0;     ///< changes made outside of solves, which invalidate quasi-Newton history
 
   void jump() {
     ++revision;
@@ -27,14 +27,14 @@ struct RadialShape {
   }
 };
 
-/// The objective in one precision, and what it measured last.
+/// The objective in one precision, and its last measurements.
 template <class Scalar>
 struct RadialPrecision {
   Dependent<std::unique_ptr<RadialObjective<Scalar>>, 1> objective;
-  Revision handles = 0;                    ///< that the objective knows
-  Revision contact = 0;                    ///< likewise
+  Revision handles = 0;                    ///< of the handles set in the objective
+  Revision contact = 0;                    ///< of the contact set in the objective
   Dependent<Eigen::VectorX<Scalar>, 4> u;  ///< measurements of the current shape
-  int uses = 0;                            ///< solves since they were measured afresh
+  int uses = 0;                            ///< solves that have updated them incrementally
 };
 
 /// The factored preconditioner: L⁻¹ for stiffness, handles, stance and inertia = L Lᵀ.
@@ -44,11 +44,11 @@ struct RadialPreconditioner {
   Revision revision = 0;
 };
 
-/// What past solves tell the next one.
+/// Warm-start data from past solves.
 struct SolveHistory {
   struct Start {
     RowMatrix<double> coefficients;
-    VectorF u;  ///< empty: measured afresh since
+    VectorF u;  ///< measurements; empty: they were recomputed since, and rounding differs
   };
   Dependent<QuasiNewton, 7> optimizer;
   Dependent<Start, 4> start;  ///< where the last solve started
@@ -65,7 +65,7 @@ struct RadialState {
   RadialObjective<Scalar>& objective(RadialPrecision<Scalar>& precision);
   template <class Scalar>
   const Eigen::VectorX<Scalar>& measurements(RadialPrecision<Scalar>& precision);
-  /// Says that the coefficients have changed, and what their measurements are.
+  /// Marks the coefficients as changed, with these measurements.
   template <class Scalar>
   void set_measurements(RadialPrecision<Scalar>& precision, Eigen::VectorX<Scalar> u) {
     ++shape.revision;
@@ -74,12 +74,12 @@ struct RadialState {
   template <class Scalar>
   QuasiNewtonReport descend(RadialPrecision<Scalar>& precision, const QuasiNewtonOptions& how,
                             const Progress& progress);
-  /// Starts one step further along a drag's last change where that is better. Returns where it would have.
+  /// Adds the change between the last two starts of a drag if it lowers the objective; returns the old start.
   SolveHistory::Start extrapolate();
-  /// Measures the report in this precision.
+  /// Fills the report, in this precision.
   template <class Scalar>
   void measure(RadialPrecision<Scalar>& precision);
-  /// What follows depends on the coefficients alone.
+  /// Discards warm-start data, so that the next solve depends on the coefficients alone.
   void invalidate_history();
   std::array<Revision, 4> start_revisions() const {
     return {problem.energy_revision, preconditioner.revision, shape.jumps, contact.presses()};
@@ -91,20 +91,20 @@ struct RadialState {
   StiffnessTerms stiffness;
   SurfaceDynamics dynamics;
   ContactTerms contact;
-  Dependent<std::vector<Index>, 1> holders;   ///< which handle holds each sample; −1: none
-  Dependent<Vector, 1> pin_widths;            ///< of the shape at point handles
+  Dependent<std::vector<Index>, 1> holders;   ///< the handle that holds each sample; −1: none
+  Dependent<Vector, 1> pin_widths;            ///< width of the shape at each point handle
   Dependent<std::vector<Index>, 1> mirrored;  ///< with symmetry, the sample nearest to each one's reflection
   struct Tried {
     Points targets;                  ///< the handles'
     RowMatrix<double> coefficients;  ///< of what they made
-  } tried;                           ///< where a solve without contact was tried last
-  bool in_one_go = false;            ///< no smaller steps of the handles come before a solve
+  } tried;                           ///< last trial of ContactSolve::comes_apart()
+  bool in_one_go = false;            ///< handles jump to their targets, unlike in a drag
   RadialHooks hooks;
   Revision hooks_revision = 0;
   RadialPreconditioner preconditioner;
   RadialShape shape;
-  RadialPrecision<float> fast;    ///< what a drag needs
-  RadialPrecision<double> exact;  ///< what follows where more is needed
+  RadialPrecision<float> fast;    ///< for all solves
+  RadialPrecision<double> exact;  ///< for tolerances below single precision
   SolveHistory history;
   TrackedPoints tracked;
   RadialReport report;

@@ -18,19 +18,21 @@
 namespace arapfields {
 namespace {
 
-/// Centers overlap so much that the matrix is singular up to rounding.
+/// Tikhonov term, as a fraction of the mean diagonal: centers overlap so much that the matrix is singular up
+/// to rounding.
 constexpr double ridge = 1e-9;
-/// Three mixtures stand for the nine derivatives at a sample, for a third of the products.
+/// Three linear combinations stand for the nine derivatives at a sample, for a third of the products.
 constexpr int derivatives = 9, mixtures = 3;
-/// Samples of a stance.
+/// Most samples of stance_rows().
 constexpr Index stance_samples = 1000;
-/// Parts are summed on their own, so that the result does not depend on the number of threads. Progress is
-/// reported after a slice of each.
+/// The sum is split into so many parts, independent of the number of threads, so that its rounding is too.
+/// Progress is reported after each of `slices` slices of all parts.
 constexpr Index parts = 4, slices = 8;
-/// Points whose products are taken together: neighbours, with nearly the same active centers.
+/// Points of a block, and blocks per product: neighbours, which have nearly the same active centers.
 constexpr Index block_size = 16, blocks_at_once = 3;
 
-/// An orthogonal matrix (cosines) times √3: three of its rows stand for all nine in the mean.
+/// An orthogonal matrix (of a discrete cosine transform) times √3: over triples of points, which take three
+/// rows each, the mean of the combinations' squares is that of all nine derivatives.
 RowMatrix<double> mixing_matrix() {
   RowMatrix<double> result(derivatives, derivatives);
   for (int i = 0; i < derivatives; ++i)
@@ -40,10 +42,10 @@ RowMatrix<double> mixing_matrix() {
   return result;
 }
 
-/// The products of the basis functions' derivatives, weighted, summed over points.
+/// Assembles the weighted sum over points of the products of basis functions' derivatives.
 class StiffnessAssembler {
  public:
-  /// `free` (derivatives + 1, points): the jets of a factor of all functions, or empty.
+  /// `free` (derivatives + 1, points): jets of the free weight, a factor on all basis functions; or empty.
   StiffnessAssembler(const RadialEvaluator<double>& sites, Vector roots, Vector weight_roots, Vector free)
       : sites_(sites),
         roots_(std::move(roots)),
@@ -51,8 +53,8 @@ class StiffnessAssembler {
         free_(std::move(free)),
         mixing_(mixing_matrix()) {}
 
-  /// Of the points of blocks first to last−1. Of `sum`, whose rows and columns are the centers, the constant
-  /// and three linear functions, the lower triangle counts.
+  /// Adds the products at the points of blocks first to last−1 to the lower triangle of `sum`, whose rows and
+  /// columns are the centers, the constant and three linear functions.
   void add(Index first, Index last, RowMatrix<double>& sum);
 
  private:
@@ -65,7 +67,7 @@ class StiffnessAssembler {
   Vector roots_, weight_roots_;  // √λ and √w of the points; the latter may be empty
   Vector free_;
   RowMatrix<double> mixing_;
-  std::vector<std::int32_t> active_, both_;  // centers that the points feel, ascending
+  std::vector<std::int32_t> active_, both_;  // centers whose support contains a point, ascending
   std::vector<double> jets_;
   std::array<double, mixtures * derivatives * block_size> mix_{};  // (mixture, derivative, point)
   RowMatrix<double> rows_, products_;
@@ -82,21 +84,22 @@ void StiffnessAssembler::gather_active(Index first, Index last) {
   }
 }
 
-/// What each derivative at each point of a block counts in each mixture; neighbours have different mixtures.
+/// Fills mix_: the factor of each derivative at each point of a block in each combination. Three consecutive
+/// points take different rows of the mixing matrix.
 void StiffnessAssembler::mix(Index b) {
   const Index points = std::min(block_size, sites_.size() - block_size * b);
   mix_.fill(0.0);
   for (int m = 0; m < mixtures; ++m)
     for (int c = 0; c < derivatives; ++c)
       for (Index p = 0; p < points; ++p) {
-        const double shared = c < 6 ? 1.0 : std::numbers::sqrt2;  // mixed derivatives stand for two
+        const double shared = c < 6 ? 1.0 : std::numbers::sqrt2;  // mixed derivatives occur twice in ‖D‖²
         mix_[static_cast<std::size_t>((m * derivatives + c) * block_size + p)] =
             mixing_(mixtures * (p % 3) + m, c) * (c < 3 ? 1.0 : shared * roots_[block_size * b + p]) *
             (weight_roots_.size() > 0 ? weight_roots_[block_size * b + p] : 1.0);
       }
 }
 
-/// The factor, where there is one, times the jets (derivatives + 1, block_size) of a function.
+/// Multiplies the jets (derivatives + 1, block_size) of a basis function by the free weight, if there is one.
 void StiffnessAssembler::multiply(Index b, double* jets) const {
   if (free_.size() == 0) return;
   const Index n = sites_.size(), points = std::min(block_size, n - block_size * b);

@@ -8,12 +8,12 @@
 
 namespace arapfields {
 
-/// A style at the samples of the energy, and the stance that a styled figure without handles keeps.
+/// The style term at the energy samples, and the stance term of a styled figure without handles.
 class StyleTerms {
  public:
   explicit StyleTerms(const RadialProblem& problem) : problem_(problem) {}
-  /// A style that changes nothing, or of strength 0, is none. Throws InvalidInput for numbers out of range,
-  /// and for samples without normals.
+  /// An idle style, or one of strength 0, is removed. Throws InvalidInput for numbers out of range, and for
+  /// samples without normals.
   void set(const StyleRequest& request);
   void clear();
 
@@ -22,7 +22,7 @@ class StyleTerms {
   const std::optional<StyleTerm<double>>& style();
   const std::optional<StanceTerm<double>>& stance(bool has_handles);
   Revision revision() const { return revision_; }
-  /// Of the stance, which a stronger or weaker style keeps; 0 without one.
+  /// Revision of the stance, which does not depend on the style's strength; 0 without one.
   Revision stance_revision(bool has_handles) const {
     return keeps_stance(has_handles) ? stance_revision_ : 0;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Terms of a RadialObjective: what they are evaluated with, and their values.
+// Terms of a RadialObjective: their data and their values.
 #pragma once
 
 #include <optional>
@@ -17,18 +17,18 @@ struct StyleRequest {
   double strength;
   double sharpness;  ///< 0: the style's own
   Vector weights;    ///< of all samples; empty: all 1
-  Vec3 up;           ///< where the figure's head is
+  Vec3 up;           ///< the figure's upward direction
 };
 
 template <class Scalar>
 struct StyleTerm {
   std::optional<GaussPreference> preference;  ///< none: targets
   PointsOf<Scalar> normals;                   ///< (n,3) at rest
-  PointsOf<Scalar> targets;                   ///< (n,3), or none
+  PointsOf<Scalar> targets;                   ///< (n,3) T(n) of an object's style, or empty
   Eigen::VectorX<Scalar> weights;             ///< (n)
   double weight = 1.0;                        ///< λ_Gauss
 
-  /// Whether the normals are as they should be already.
+  /// Whether the rest normals minimise the style's energy already.
   bool idle() const { return StyleAtSamples{preference, targets, weights}.idle(normals); }
   template <class Other>
   StyleTerm<Other> cast() const {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What both ways of training an inverse share.
+// Helpers of the two objectives that train an inverse (inverse_training, invertible_objective).
 #pragma once
 
 #include "core/random.h"

@@ -79,7 +79,7 @@ FieldObjective::Batch FieldObjective::draw(Random& random) {
               Vector(styled() && terms_.style.weights.size() > 0 ? count : 0),
               terms_.stance};
   batch.stance.ground.setZero(stands() ? count : 0);
-  // Fresh samples stand evenly among the others: stretch b has one where b·fresh/count steps up.
+  // Fresh samples are evenly spaced: interval b has one if ⌊b·fresh/count⌋ is below that of b + 1.
   for (Index b = 0; b < count; ++b) {
     if (terms_.fresh > 0 && b * terms_.fresh / count != (b + 1) * terms_.fresh / count) {
       const Index i = next_fresh(random);

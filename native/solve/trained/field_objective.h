@@ -22,7 +22,7 @@ class Tensor;
 ///   handles + external.
 struct ObjectiveTerms {
   Index batch = 0;  ///< samples an iteration
-  Index fresh = 0;  ///< of the batch, samples that are drawn anew; needs samples.redraw
+  Index fresh = 0;  ///< number of the batch's samples that samples.redraw draws anew
   double rigidity = 1.0;
   SurfaceStiffness stiffness;  ///< λ
   Vector weights;              ///< w, one a sample; empty: all 1
@@ -37,10 +37,10 @@ struct ObjectiveTerms {
   ExternalEnergies external;
 };
 
-/// Estimates the terms on random subsets of the samples: the samples are put in spatial order and one is
-/// drawn from each of `batch` equal stretches of it, which covers the surface more evenly than independent
-/// draws. Jets are of the lowest order that the terms allow; handles need values alone. Subsets are drawn in
-/// main memory, from the same random numbers wherever the field lives.
+/// Estimates the terms on random subsets of the samples, by stratified sampling: the samples are put in
+/// spatial order and one is drawn from each of `batch` equal intervals of it, which covers the surface more
+/// evenly than independent draws. Jets are of the lowest order that the terms allow; handles need values
+/// alone. Subsets are drawn on the CPU, from the same random numbers whatever the field's device.
 class FieldObjective final : public Objective {
  public:
   FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms);
@@ -61,7 +61,7 @@ class FieldObjective final : public Objective {
     Vector style_weights;
     Stance stance;
   };
-  /// What the terms need on a device, beside each batch.
+  /// Tensors on the field's device that do not change between batches.
   struct Constants;
 
   Batch draw(Random& random);
@@ -74,10 +74,10 @@ class FieldObjective final : public Objective {
   template <class Scalar>
   double by_kernels(TrainableField& field, Random& random);
   Tensor by_compositions(TrainableField& field, Random& random);
-  /// The external energies of jets on a device.
+  /// Adds the external energies of jets on a device, and their cotangents.
   void add_external(const Points& points, const Tensor& jets, Tensor cotangents, Tensor& value);
 
-  /// The next fresh sample; draws another pool of as many as there are samples when one is used up.
+  /// Row of `pool_` of the next fresh sample; redraws the pool, as large as the samples, when it is used up.
   Index next_fresh(Random& random);
 
   const SurfaceSamples& samples_;
@@ -88,10 +88,10 @@ class FieldObjective final : public Objective {
   Vector pool_bending_;
   Index used_ = 0;
   std::unique_ptr<Constants> constants_;
-  /// The last estimate's weighted terms, where they were computed.
+  /// The last estimate's weighted terms, on the device where they were computed.
   struct Computed;
   std::vector<Computed> computed_;
-  std::vector<double> external_;  // those of external energies
+  std::vector<double> external_;  // the last estimate's external energies, weighted
 };
 
 }  // namespace arapfields

@@ -11,12 +11,12 @@
 namespace arapfields {
 namespace {
 
-/// Away from the surface f may fold or tear space, and there is no inverse to be learnt: a cycle that misses
-/// by more than this counts ever less.
+/// Cycle error, in cube units, above which a point's weight falls off: away from the surface f may fold
+/// space, and has no inverse there.
 constexpr double believable = 0.02;
 
-/// (n, 1) what the cycle's gradient at each point counts: 1 near f's inverse where f keeps lengths, and less
-/// where the cycle misses by far or J would magnify what it misses by.
+/// (n, 1) weight of each point in the cycle's gradient: 1 for small errors where f is an isometry, less for
+/// large errors and where J would magnify them.
 Tensor share_of(const Tensor& jets, const Tensor& cycle) {
   const Tensor missed = sum(square(cycle), {1}, true) / (believable * believable);
   const Tensor stretch = sum(square(jets.slice(0, first_column(0), first_column(3))), {0, 2});

@@ -8,9 +8,9 @@
 
 namespace arapfields {
 
-/// A network g ≈ f⁻¹, trained on the cycle ‖f(g(y)) − y‖² at deformed samples and at uniform points of their
-/// box (enlarged by a tenth), and at the samples x on ‖g(f(x)) − x‖² too, which decides where f has several
-/// preimages. Its report's energy is that mean square cycle error; the frame is f's.
+/// A network g ≈ f⁻¹, trained on the cycle error ‖f(g(y)) − y‖² at deformed samples and at uniform points of
+/// their bounding box (enlarged by a tenth), and on ‖g(f(x)) − x‖² at the samples x, which selects one of
+/// several preimages. The report's energy is the mean squared cycle error; the frame is f's.
 ARAPFIELDS_EXPORT Solution train_inverse(const DeformationField& field, const SurfaceSamples& samples,
                                          const InverseTrainingOptions& options,
                                          const Progress& progress = {});

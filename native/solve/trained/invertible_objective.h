@@ -12,8 +12,8 @@ namespace arapfields {
 
 class Tensor;
 
-/// Another objective, and weight × mean ‖g(f(x)) − x‖² with an inverse g that learns beside f, over samples
-/// and uniform points of the cube: where f folds no g exists, so folds cost.
+/// An inner objective plus weight · mean ‖g(f(x)) − x‖² over samples and uniform points of the cube, with a
+/// network g ≈ f⁻¹ that is trained alongside f. Where f folds no inverse exists, so the term penalises folds.
 class InvertibleObjective final : public Objective {
  public:
   InvertibleObjective(Objective& inner, const SurfaceSamples& samples, Index batch, double weight,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Objectives as tests and benchmarks ask for them.
+// Objectives for tests and benchmarks.
 #pragma once
 
 #include <memory>
@@ -18,16 +18,16 @@ struct LossGradient {
   Vector gradient;
 };
 
-/// Value and parameter gradient of an objective in double precision, for comparison with differences: a small
-/// network with the fixed parts and terms that a test needs. Handles are in cube coordinates, exact with a
-/// margin above 0.
+/// Value and parameter gradient of an objective in double precision, for comparison with finite differences:
+/// a small network with the terms that a test needs. Handles are in cube coordinates, and exact if `margin`
+/// is above 0.
 class ARAPFIELDS_EXPORT_TO_TESTS LossProbe {
  public:
   LossProbe(const SurfaceSamples& samples, const std::vector<Handle>& handles, int width, double bending,
             const Points& preferred, double gauss, double barrier, double margin, double keep_stance,
             const ExternalEnergies& external = {}, const std::string& device = "cpu");
   ~LossProbe();
-  /// The parameters become these; the subsets are those of the seed.
+  /// Evaluates at these parameters, on the random subsets of the seed.
   LossGradient operator()(const Vector& parameters, std::uint64_t seed);
   /// Number of parameters.
   Index size() const;
@@ -37,7 +37,7 @@ class ARAPFIELDS_EXPORT_TO_TESTS LossProbe {
   std::unique_ptr<State> state_;
 };
 
-/// The rigidity energy and its parameter gradient in the field's usual network, for timing.
+/// The rigidity energy and its parameter gradient in a network of the default shape, for timing.
 class ARAPFIELDS_EXPORT_TO_TESTS EnergyTrial {
  public:
   /// `batch` samples an evaluation; the network starts with random weights in its last layer as well.

@@ -15,8 +15,8 @@ class Tensor;
 class Objective {
  public:
   virtual ~Objective() = default;
-  /// Adds the gradient of the estimate to field.gradient(); returns the estimate, one number wherever it was
-  /// computed.
+  /// Adds the gradient of the estimate to field.gradient(); returns the estimate, a scalar on the device
+  /// where it was computed.
   virtual Tensor accumulate(TrainableField& field, Random& random) = 0;
   /// The weighted terms of the last estimate, whose sum it is.
   virtual std::vector<LossTerm> terms() const { return {}; }
@@ -25,7 +25,7 @@ class Objective {
 /// Called with the number of finished iterations after each of them.
 using LoopObserver = std::function<void(int)>;
 
-/// What an optimizer moves of a field.
+/// The parameters of a field, as an optimizer takes them.
 inline Trainable trainable(TrainableField& field) {
   return {field.parameters(), field.gradient(), field.matrices()};
 }
