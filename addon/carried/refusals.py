@@ -5,6 +5,7 @@ from ..blender.modifier_stack import handle_rigs
 from ..blender.object_references import in_scene, settings_of
 from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError
+from .rest_bones import above_field
 from .world_matrices import constrained_to
 
 BINDING = {"LATTICE": "object", "CURVE": "object", "HOOK": "object"}  # modifiers that follow another object
@@ -42,7 +43,7 @@ def of_item(source, item):
     rigs = handle_rigs(source)
     if item in rigs:
         return UserError("The bones of {name} are handles of {source}", item, source=source.name)
-    if constrained_to(item, rigs):
+    if constrained_to(item, [*rigs, *above_field(source)]):
         return UserError("{name} follows the armature by a constraint; it is not carried", item)
     return moves_anyway(source, item)
 

@@ -7,11 +7,12 @@ from mathutils import Matrix
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import in_scene, settings_of
+from ..carried import refusals
 from ..carried.carried_objects import carrier_class
 from ..carried.rest_bones import above_field
 from ..carried.transforms import TransformCarrier
 from ..carried.world_matrices import array, at_present_rest, world_matrices
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.geometry import fitting
 from ..core.geometry.spaces import facing, inverse, transform
 from ..core.runtime import native
@@ -41,6 +42,7 @@ def copies(context, source, target, given, own):
         if not in_scene(item) or item == target or item.type == "ARMATURE":
             continue
         try:
+            refuse(refusals.of_item(source, item))
             shape, matrix = None, array(item.matrix_world)
             if issubclass(carrier_class(item, entry.way), TransformCarrier):
                 matrix = placed(context, source, item, entry, body)

@@ -10,6 +10,7 @@ if IN_BLENDER:
     from mathutils import Vector
     from support.blender import scenes, wraps
     from support.blender.character import link
+    from support.blender.stages import all_said
 
 pytestmark = pytest.mark.in_blender
 
@@ -83,3 +84,22 @@ def test_modifiers_and_constraints_of_copies_read_what_the_target_has():
     assert made.modifiers["Near"].target == target
     assert [one.target for one in made.constraints] == [copies()["Spot"], bpy.data.objects["Rig Soup"]]
     assert away.target == item and [one.target for one in eye.constraints] == [spot, rig]
+
+
+@pytest.mark.parametrize("way", ["FOLLOW", "RIGID"])
+def test_what_a_constraint_ties_to_a_fitted_armature_is_not_moved_twice(way):
+    item, rig = wraps.rigged_bar()
+    item.arapfields.wrap.onto = wraps.soup_of(item)
+    eye, other = ball("Eye", (0.6, -0.3, 0.1)), ball("Other", (0.6, -0.3, 0.1))
+    tie = eye.constraints.new("CHILD_OF")
+    tie.target, tie.subtarget = rig, "Upper"
+    tie.inverse_matrix = (rig.matrix_world @ rig.pose.bones["Upper"].matrix).inverted()
+    scenes.activate(eye, other, item)
+    bpy.ops.arapfields.carry(way=way)
+    assert bpy.ops.arapfields.wrap(**wraps.SMALL) == {"FINISHED"}
+    assert "Eye follows the armature by a constraint; it is not carried" in all_said()
+    own = places({one.name: one for one in (eye, other)})
+    assert np.linalg.norm(own["Eye"] - own["Other"]) < 0.3  # as the bone goes, which is as the field goes
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    assert "Carried Objects: 1, Eye follows the armature by a constraint" in all_said()
+    assert list(copies()) == ["Other"]
