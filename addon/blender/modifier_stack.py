@@ -72,9 +72,8 @@ def place(source):
         return own
     if holds_splats(source):  # what comes after draws them
         return 0
-    if settings_of(source).under_rig:
-        return max(first_posing(source), earliest(stack))
-    return end(stack)
+    last = first_posing(source) if settings_of(source).under_rig else end(stack)
+    return max(min(last, first_laid_on(source)), earliest(stack))
 
 
 def end(stack):
@@ -91,6 +90,15 @@ def first_posing(source):
     """Where the first modifier stands that poses a source's shape; the stack's length without one."""
     stack = list(source.modifiers)
     return next((index for index, one in enumerate(stack) if is_posing(source, one)), len(stack))
+
+
+def first_laid_on(source):
+    """Where the first modifier stands that lays an object on what the field moves as well, the object that
+    carries it or another one that this carries; the stack's length without one."""
+    stack, carrier = list(source.modifiers), settings_of(source).carried_by
+    moved = [] if carrier is None else [carrier, *(one.item for one in settings_of(carrier).carried)]
+    laid = (i for i, one in enumerate(stack) if one.type == "SHRINKWRAP" and one.target in moved)
+    return next(laid, len(stack))
 
 
 def earliest(stack):

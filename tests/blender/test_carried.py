@@ -12,6 +12,8 @@ if IN_BLENDER:
     from support.blender.live import step
     from support.blender.riders import body, rider, shown, taken
 
+    import arapfields as af
+    from addon.blender import mesh_arrays
     from addon.live import sessions
 
 pytestmark = pytest.mark.in_blender
@@ -118,3 +120,30 @@ def test_an_eye_on_a_bone_does_not_move_twice():
             after = taken(sessions.live[bar.session_uid], before)
             assert np.abs(scenes.world_points(eye) - after).max() < 0.02
         bpy.ops.arapfields.live()
+
+
+def test_a_sleeve_that_a_shrinkwrap_lays_on_the_body_does_not_move_twice():
+    """The field moves it first, then it is laid on the body that has moved."""
+    bar, _, moving = scenes.bar_with_handles()
+    sleeve = scenes.bar("Sleeve", 0.6)
+    for point in sleeve.data.vertices:
+        point.co.y, point.co.z = 1.3 * point.co.y, 1.3 * point.co.z
+    laid = sleeve.modifiers.new("Laid", "SHRINKWRAP")
+    laid.target, laid.wrap_mode, laid.offset = bar, "OUTSIDE", 0.05
+    bpy.context.view_layer.update()
+
+    def away():
+        bpy.context.view_layer.update()
+        body = af.MeshSdf(scenes.world_points(bar), mesh_arrays.triangles(bar.data))
+        return body(scenes.world_points(sleeve))
+
+    before = away()
+    scenes.activate(sleeve, bar)
+    assert bpy.ops.arapfields.carry() == {"FINISHED"}
+    moving.location.z += 0.4
+    bpy.context.view_layer.update()
+    assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}
+    assert [one.type for one in sleeve.modifiers] == ["NODES", "SHRINKWRAP"]
+    assert np.abs(away() - before).max() < 0.02
+    bpy.ops.arapfields.release(all=True)
+    assert [one.type for one in sleeve.modifiers] == ["SHRINKWRAP"]
