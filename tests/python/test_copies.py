@@ -54,6 +54,26 @@ def test_handles_and_frames(kind, way):
     assert type(again) is type(one) and attributes(again) == attributes(one)
 
 
+def solved(field):
+    mesh = sphere(1.0, 2)
+    handles = [af.PointHandle([0, 0, -1], [0, 0, -1]), af.PointHandle([0, 0, 1], [0, 0.1, 1.2])]
+    options = af.DeformOptions(field=field, iterations=5)
+    return af.deform(af.sample_mesh(*mesh, count=100, seed=0), handles, options)
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("kind", ["radial", "neural", "invertible", "network"])
+def test_fields_and_networks(kind, way):
+    points = np.array([[0.1, 0.2, 0.9], [0, -0.7, 0.7]])
+    if kind == "network":
+        one = af.fit_sdf(*sphere(1.0, 2), af.FitOptions(iterations=3, width=16))
+    else:
+        one = solved(kind)
+    again = WAYS[way](one)
+    assert type(again) is type(one) and np.array_equal(again(points), one(points))
+    assert attributes(again.report) == attributes(one.report)
+
+
 def energy(handles, options):
     mesh = sphere(1.0, 2)
     return af.deform(af.sample_mesh(*mesh, count=100, seed=0), handles, options).report.energy
@@ -64,6 +84,16 @@ def test_a_pool_of_processes_takes_them():
     options = af.DeformOptions(field="radial", iterations=5)
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         assert pool.submit(energy, handles, options).result() == energy(handles, options)
+
+
+def moved_points(field, points):
+    return field(points)
+
+
+def test_a_pool_of_processes_takes_a_field():
+    field, points = solved("radial"), np.array([[0.1, 0.2, 0.9]])
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        assert np.array_equal(pool.submit(moved_points, field, points).result(), field(points))
 
 
 def test_a_frame_is_equal_to_frames_alone():

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Options, handles and frames are copied and pickled by what makes them."""
+"""Options, handles and frames are copied and pickled by what makes them, fields and networks as files."""
 
 import copyreg
 import functools
+import tempfile
+from pathlib import Path
 from typing import Any
 
 NAMES: dict[str, tuple[str, ...]] = {
@@ -14,10 +16,27 @@ NAMES: dict[str, tuple[str, ...]] = {
 }
 
 
+FILED = ("DeformationField", "RadialField", "NeuralSdf")
+
+
 def reduced(item: Any) -> tuple[functools.partial[Any], tuple[()]]:
     kind = type(item)
     names = NAMES.get(kind.__name__) or kind.fields
     return functools.partial(kind, **{name: getattr(item, name) for name in names}), ()
+
+
+def filed(item: Any) -> tuple[Any, tuple[Any, bytes]]:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "pickled.safetensors")
+        item.save(path)
+        return restored, (type(item), path.read_bytes())
+
+
+def restored(kind: Any, content: bytes) -> Any:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "pickled.safetensors")
+        path.write_bytes(content)
+        return kind.load(path)
 
 
 def register(classes: dict[str, Any]) -> None:
@@ -25,3 +44,5 @@ def register(classes: dict[str, Any]) -> None:
     for name, kind in classes.items():
         if name in NAMES or name.endswith("Options"):
             copyreg.pickle(kind, reduced)
+        elif name in FILED:
+            copyreg.pickle(kind, filed)
