@@ -29,7 +29,7 @@ struct Primitive {
   std::int32_t triangle;
 };
 
-/// A run of primitives that becomes one child; `level` counts the splits that led to it.
+/// A range of primitives that becomes one child; `level` is its number of splits from the root.
 struct PrimitiveRange {
   Index begin = 0, end = 0;
   int level = 0;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr Index grain = 4096;
 
-/// A box that holds the triangle with certainty: single precision, moved outwards by more than its rounding.
+/// A conservative box of the triangle: single precision, enlarged by more than its rounding.
 PrimitiveBox outer_box(const Points& vertices, TrianglesIn triangles, Index t) {
   const Vec3 a = vertices.row(triangles(t, 0)), b = vertices.row(triangles(t, 1));
   const Vec3 c = vertices.row(triangles(t, 2));
@@ -36,7 +36,7 @@ class Builder {
     });
   }
 
-  /// Two levels are split first; the (up to 64) subtrees below are then built side by side.
+  /// Two levels are split first; the (up to 64) subtrees below are then built in parallel.
   Topology build() {
     PrimitiveRange all{0, static_cast<Index>(primitives_.size()), 0, {}};
     for (const Primitive& p : primitives_) all.box.grow(p.box);
@@ -93,7 +93,7 @@ class Builder {
   std::int32_t add_child(const PrimitiveRange& range, Topology& tree) {
     if (range.size() > tree_width)
       return add_node(wide_split(range), tree, [&](const PrimitiveRange& r) { return add_child(r, tree); });
-    // In the order of their numbers, so that the first of several equally near triangles is the lowest.
+    // In ascending order, so that of several equally near triangles the one of lowest index is found.
     std::sort(primitives_.begin() + range.begin, primitives_.begin() + range.end,
               [](const Primitive& a, const Primitive& b) { return a.triangle < b.triangle; });
     tree.leaves.push_back({range.begin, static_cast<int>(range.size())});
@@ -118,7 +118,7 @@ class Builder {
     return static_cast<std::int32_t>(node);
   }
 
-  /// Moves a subtree behind what is there; returns its new root.
+  /// Appends a subtree to a tree; returns its new root.
   static std::int32_t append(const Topology& part, std::int32_t root, Topology& tree) {
     const auto node = static_cast<std::int32_t>(tree.nodes.size());
     const auto leaf = static_cast<std::int32_t>(tree.leaves.size());

@@ -20,7 +20,7 @@ struct Topology {
   std::vector<WideNode> nodes;          ///< the root is the first
   std::vector<Leaf> leaves;             ///< child < 0 is leaf ~child
   std::vector<std::int32_t> triangles;  ///< ascending in each leaf
-  std::vector<std::int32_t> subtrees;   ///< nodes below which work can be shared out; none holds another
+  std::vector<std::int32_t> subtrees;   ///< roots of disjoint subtrees, for parallel work
 };
 
 /// Depends on the mesh alone, not on the thread count. Coordinates must fit single precision.

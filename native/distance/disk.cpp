@@ -8,7 +8,7 @@
 namespace arapfields {
 namespace {
 
-/// How far a disk reaches along and across a unit direction.
+/// Half extent of a disk along a unit direction, by its cosine with the disk's normal.
 double half_extent_along(double height, double radius, double cosine) {
   return height * std::abs(cosine) + radius * std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
 }

@@ -6,8 +6,8 @@
 
 namespace arapfields {
 
-/// A flat cylinder that holds a patch of the surface: on slanted patches, where boxes are thick and mostly
-/// empty, it bounds distances far better.
+/// A bounding volume: a flat cylinder around a patch of the surface. It bounds distances far better than an
+/// axis-aligned box on slanted patches, where boxes are thick and mostly empty.
 struct Disk {
   Vec3 center = Vec3::Zero();
   Vec3 normal = Vec3::UnitZ();
@@ -15,11 +15,11 @@ struct Disk {
   double radius = 0.0;
 };
 
-/// A disk about all parts, across a direction that need be neither of unit length nor different from zero.
-/// A point is a part without height and radius.
+/// A disk around all parts, with its normal along `direction`, of any length, even zero. A point is a part
+/// without height and radius.
 Disk disk_around(const Disk* parts, int count, const Vec3& direction);
 
-/// Writes a disk into one lane, enlarged by what rounding its numbers may have cost.
+/// Writes a disk into one lane, enlarged by the possible rounding errors.
 void store(const Disk& disk, WideNode& node, int lane);
 
 }  // namespace arapfields

@@ -16,7 +16,7 @@
 namespace arapfields {
 namespace {
 
-/// What a parent needs to know of a child.
+/// The bounds and moments of a child, from which those of its parent are made.
 struct Summary {
   Disk disk;
   Multipole multipole;
@@ -79,7 +79,7 @@ class Summarizer {
     return summarize(number, [&](std::int32_t child) { return child < 0 ? leaf(~child) : node(child); });
   }
 
-  /// A node at or above the subtrees, whose summaries are there already.
+  /// Summarises a node at or above the roots of the subtrees, which are done already.
   Summary top(std::int32_t number) {
     return summarize(number, [&](std::int32_t child) {
       if (child < 0) return leaf(~child);

@@ -61,7 +61,7 @@ struct Nearest {
   std::int32_t packet;
 };
 
-/// Levels of splitting after which ranges are cut in the middle, and what a traversal may have to remember.
+/// Levels of splitting after which ranges are halved, and the largest stack of a traversal.
 constexpr int skewed_split_levels = 40;
 constexpr int stack_size = (skewed_split_levels + 32) * (tree_width - 1) + 1;
 

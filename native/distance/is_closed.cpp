@@ -16,7 +16,7 @@ std::uint64_t mixed(std::uint64_t x) {
 
 }  // namespace
 
-/// Through an open hash table.
+/// By an open-addressing hash table.
 std::vector<std::int32_t> first_at_position(PointsIn vertices) {
   const auto count = static_cast<std::size_t>(vertices.rows());
   const std::size_t size = std::bit_ceil(2 * count + 1);

@@ -10,9 +10,9 @@ namespace arapfields {
 /// For each vertex (n) the first at the same position.
 std::vector<std::int32_t> first_at_position(PointsIn vertices);
 
-/// Whether every edge is passed as often in one direction as in the other, vertices at equal positions taken
-/// as one: the soup is then a cycle, and its winding number is constant on every connected set that meets no
-/// triangle. Needs neither manifold edges nor freedom from self-intersections.
+/// Whether each edge is used by triangles equally often in both directions, with vertices welded by position:
+/// the soup is then a cycle, and its winding number is constant on every connected set that meets no
+/// triangle. Edges may be non-manifold, and triangles may intersect.
 bool is_closed(PointsIn vertices, TrianglesIn triangles);
 
 }  // namespace arapfields

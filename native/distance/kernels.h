@@ -16,12 +16,12 @@ constexpr int linked_points = 64;
 /// Nearest triangle of each point.
 ARAPFIELDS_DECLARE(void nearest(const HierarchyView& tree, const double* points, std::int64_t count,
                                 Nearest* results))
-/// The same from every packet in turn: what nearest() must equal, bit for bit.
+/// The same by brute force over all packets: the reference that nearest() must equal bit for bit.
 ARAPFIELDS_DECLARE(void nearest_of_all(const HierarchyView& tree, const double* points, std::int64_t count,
                                        Nearest* results))
 /// Winding number of each point. A child is replaced by its moments where the distance to its center exceeds
 /// `opening` times its radius. `remainders`, if not null, gets the sum over replaced children of
-/// area / (4π R²) · (radius / R)⁴, a scale for what was left out.
+/// area / (4π R²) · (radius / R)⁴, the scale of the truncation error.
 ARAPFIELDS_DECLARE(void winding(const HierarchyView& tree, const double* points, std::int64_t count,
                                 double opening, double* numbers, double* remainders))
 /// Bit j of links[i]: the empty balls about points i and j overlap. count ≤ linked_points.

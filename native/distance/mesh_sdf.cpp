@@ -9,7 +9,7 @@
 namespace arapfields {
 namespace {
 
-// Of the frame's scale: nearer to a triangle the offset to it is lost in rounding.
+// Relative to the frame's scale: at smaller distances the direction to the triangle is lost in rounding.
 constexpr double on_surface = 1e-12;
 constexpr Index points_a_task = 1024;
 

@@ -19,13 +19,13 @@ struct Multipole {
   std::array<Mat3, 3> octupole = {Mat3::Zero(), Mat3::Zero(), Mat3::Zero()};
 };
 
-/// Of triangles with corners corners[3 i + 0..2]; the center is their centroid by area.
+/// The moments of triangles with corners corners[3 i + 0..2]; the center is their area-weighted centroid.
 Multipole multipole_of(const Vec3* corners, int triangle_count);
 
-/// Of all the parts together.
+/// The moments of the union of all parts.
 Multipole multipole_of(const Multipole* parts, int count);
 
-/// Writes what evaluation needs into one lane.
+/// Writes the moments into one lane.
 void store(const Multipole& multipole, NodeMoments& moments, int lane);
 /// Makes a lane contribute nothing.
 void store_nothing(NodeMoments& moments, int lane);

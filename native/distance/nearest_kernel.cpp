@@ -15,8 +15,7 @@ namespace {
 
 constexpr int W = tree_width;
 
-/// Makes `best` the nearest among itself and a packet's triangles. Never inlined: every caller must see the
-/// same rounding.
+/// Updates `best` with a packet's triangles. Never inlined: rounding must be the same for all callers.
 __attribute__((noinline)) void visit(const TrianglePacket& t, std::int32_t index, const double* p,
                                      Nearest& best) {
   alignas(64) double squared[W];
@@ -53,8 +52,8 @@ __attribute__((noinline)) void visit(const TrianglePacket& t, std::int32_t index
   }
 }
 
-/// A point in single precision: an interval that holds the exact one, and its error beside lengths up to
-/// that of the way to any disk.
+/// A query point in single precision: an interval that contains the exact one, and the absolute rounding
+/// error of distances to disks.
 struct Query {
   float low[3], high[3], middle[3];
   float slack;
@@ -73,10 +72,10 @@ Query rounded(const double* p) {
   return result;
 }
 
-/// No child whose squared distance, as bounds_from_below rounds it, exceeds this can hold anything as near.
+/// Children whose lower bound (bounds_from_below) exceeds this cannot contain a nearer triangle.
 float limit_of(const Nearest& best) { return static_cast<float>(best.squared_distance) * 1.000002f + 1e-37f; }
 
-/// For each child the squared distance to its box or to its disk, whichever is larger.
+/// For each child a lower bound of the squared distance: that to its box or to its disk, whichever is larger.
 inline void bounds_from_below(const WideNode& node, const Query& p, float* squared) {
   for (int i = 0; i < W; ++i) {
     float to_box = 0.0f;
@@ -120,8 +119,8 @@ inline unsigned at_most(const float* values, float limit) {
 #endif
 }
 
-/// What is left to visit, nearest on top. An entry is a bound from below, its bits in the upper half so that
-/// entries sort by it, and a child.
+/// The children left to visit, the nearest on top. An entry has the bits of the child's lower bound in its
+/// upper half, by which entries sort, and the child in its lower half.
 struct Stack {
   std::uint64_t entries[stack_size];
   std::uint64_t* top = entries;
@@ -162,7 +161,7 @@ void search(const HierarchyView& tree, const double* p, Nearest& best) {
     }
     alignas(64) float first[W], second[W];
     bounds_from_below(tree.nodes[child], query, first);
-    // The next node is likely to be needed as well; both at a time hide each other's latency.
+    // The next node is likely to be visited as well; processing both hides memory latency.
     if (!stack.empty() && stack.top_child() >= 0) {
       const std::int32_t other = stack.top_child();
       --stack.top;
@@ -201,7 +200,7 @@ void overlapping(const double* points, const Nearest* nearest, int count, std::u
   alignas(64) std::uint64_t bit[linked_points];
   for (int i = 0; i < linked_points; ++i) {
     for (int k = 0; k < 3; ++k) x[k][i] = i < count ? points[3 * i + k] : 0.0;
-    // Shrunk, so that rounding cannot make balls touch that do not.
+    // Shrunk, so that disjoint balls do not overlap by rounding.
     radius[i] = i < count ? std::sqrt(nearest[i].squared_distance) * (1.0 - 1e-9) : 0.0;
     bit[i] = i < count ? std::uint64_t{1} << i : 0;
   }

@@ -21,14 +21,14 @@
 namespace arapfields {
 namespace {
 
-/// Points that are sorted together; bounds the memory of a query.
+/// Most points that are sorted at once; bounds the memory of a query.
 constexpr Index sorted_points = Index{1} << 21;
 constexpr Index block_size = linked_points;
 constexpr double farthest = 1e90;
 
-/// Distances, in radii of a cluster, beyond which its moments replace it. Sides are decided by the coarsest
-/// opening whose error bound excludes 1/2. In every mesh measured (near and far points; soups, scans, models)
-/// the error stayed below 0.31 of the remainder that the kernel reports; half of the remainder is the bound.
+/// Distances, in radii of a cluster, beyond which its moments replace it. Signs are decided by the coarsest
+/// opening whose error bound excludes 1/2. On all meshes measured (near and far points; soups, scans, models)
+/// the error is below 0.31 of the remainder that the kernel reports; the bound is half of the remainder.
 constexpr std::array<double, 3> openings_of_sides = {1.2, 2.0, 4.0};
 constexpr double ambiguity_of_remainder = 0.5;
 constexpr double opening_of_numbers = 3.0;
@@ -36,7 +36,7 @@ constexpr double opening_of_numbers = 3.0;
 /// A few points that are near each other.
 struct Block {
   int count = 0;
-  std::array<Index, block_size> rows;         ///< which points of the query they are
+  std::array<Index, block_size> rows;         ///< rows of the query
   std::array<double, 3 * block_size> points;  ///< in the hierarchy's coordinates
 };
 
@@ -83,7 +83,7 @@ void run_nearest(const HierarchyView& view, const Block& block, Nearest* results
   ARAPFIELDS_DISPATCH(nearest(view, block.points.data(), block.count, results));
 }
 
-/// inside[i]: the soup winds about point i more than half a time.
+/// inside[i]: whether the winding number at point i exceeds 1/2.
 void sides(const HierarchyView& view, const double* points, int count, bool* inside) {
   std::array<double, 3 * block_size> queries;
   std::array<int, block_size> rows;
@@ -104,8 +104,8 @@ void sides(const HierarchyView& view, const double* points, int count, bool* ins
   }
 }
 
-/// inside[i] for points about which the soup winds an integer number of times: balls that hold no triangle
-/// and overlap lie on one side, so one point, the one farthest from the surface, answers for each cluster.
+/// inside[i] for closed soups: overlapping balls that contain no triangle lie on one side, so the winding
+/// number is evaluated only at the point of each cluster that is farthest from the surface.
 void sides_of_clusters(const HierarchyView& view, const Block& block, const Nearest* nearest, bool* inside) {
   std::array<std::uint64_t, block_size> links;
   ARAPFIELDS_DISPATCH(overlapping(block.points.data(), nearest, block.count, links.data()));

@@ -15,7 +15,7 @@ namespace arapfields {
 struct TrainingPoints {
   PointsF points;          ///< (n,3), cube coordinates
   VectorF distances;       ///< (n), cube units, negative inside
-  Index near_surface = 0;  ///< so many rows at the front; fine and coarse spreads take turns
+  Index near_surface = 0;  ///< number of near-surface rows; fine and coarse offsets alternate
 };
 
 /// Displaced points that leave the cube are moved to its boundary. Point i depends on the seed and i alone.

@@ -21,8 +21,8 @@ Vec3 any_perpendicular(const Vec3& unit) {
   return unit.cross(Vec3::Unit(smallest)).normalized();
 }
 
-/// The x axis lies along the longest side: then a plane that is lost to rounding, as a needle's is, moves no
-/// point of the triangle by more than the rounding of that side.
+/// The x axis is along the longest side: if a needle's plane is lost to rounding, no point of it moves by
+/// more than the rounding error of that side.
 Planar in_its_plane(const Vec3* v) {
   int start = 0;
   double longest = -1.0;

@@ -39,7 +39,7 @@ std::vector<Index> WeldedVertices::pieces(const TriangleMesh& mesh) const {
 
 std::vector<std::vector<Index>> WeldedVertices::closed_pieces(const TriangleMesh& mesh, double size) const {
   const std::vector<Index> piece_of = pieces(mesh);
-  std::map<std::pair<std::int32_t, std::int32_t>, int> open;  // edges, and how often they are passed
+  std::map<std::pair<std::int32_t, std::int32_t>, int> open;  // directed edges, and how often they occur
   const auto edge_of = [&](Index t, int k) {
     return std::pair(first[mesh.triangles(t, k)], first[mesh.triangles(t, (k + 1) % 3)]);
   };

@@ -7,15 +7,15 @@
 
 namespace arapfields {
 
-/// A mesh's vertices with all at one place taken as one, so that its connectivity does not matter.
+/// A mesh's vertices welded by position, independent of how its triangles are joined.
 struct WeldedVertices {
   explicit WeldedVertices(const TriangleMesh& mesh);
 
-  std::vector<std::int32_t> first;  ///< (n) of each vertex, the first at its place
-  Points normals;                   ///< (n,3) of those; zero where no triangle is
-  /// Which piece each vertex (n) belongs to, from 0: vertices that triangles join are of one.
+  std::vector<std::int32_t> first;  ///< (n) for each vertex, the first one at its position
+  Points normals;                   ///< (n,3) of the welded vertices; zero without a triangle
+  /// The connected component of each vertex (n).
   std::vector<Index> pieces(const TriangleMesh& mesh) const;
-  /// Closed pieces of at most this size, as lists of vertices: eyes, teeth, buttons.
+  /// Closed components of at most this diagonal, as lists of vertices: eyes, teeth, buttons.
   std::vector<std::vector<Index>> closed_pieces(const TriangleMesh& mesh, double size) const;
 };
 

@@ -10,8 +10,8 @@ namespace {
 constexpr int W = tree_width;
 constexpr double pi = std::numbers::pi;
 
-/// atan2(y, x) to 1e-15. On [0, tan(π/8)] a minimax polynomial of atan(t)/t in t². Choices are made by
-/// factors 0 and 1: compilers turn conditions into branches, and then use no vectors.
+/// atan2(y, x) to 1e-15. On [0, tan(π/8)] a minimax polynomial of atan(t)/t in t². Selections are factors 0
+/// and 1: compilers turn conditions into branches, and then do not vectorise.
 inline double arc_tangent(double y, double x) {
   const double ax = std::fabs(x), ay = std::fabs(y);
   const double swap = ax < ay ? 1.0 : 0.0, back = x < 0.0 ? 1.0 : 0.0;

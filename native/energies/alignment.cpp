@@ -34,7 +34,7 @@ Mat4 rigid_motion(PointsIn points, PointsIn moved, const Vector& weights) {
                                   weights.minCoeff() >= 0.0 && weights.maxCoeff() > 0.0),
           "weights", std::to_string(weights.size()) + " numbers, or negative, non-finite or only zeros",
           "one weight ≥ 0 for each of the " + std::to_string(points.rows()) + " points, or none, is needed");
-  // Units in which squares neither overflow nor vanish.
+  // Units in which squares neither overflow nor underflow.
   const Vec3 origin = points.row(0), end = moved.row(0);
   Points from = points.rowwise() - origin.transpose(), to = moved.rowwise() - end.transpose();
   const double unit = std::max(from.cwiseAbs().maxCoeff(), to.cwiseAbs().maxCoeff());

@@ -5,14 +5,15 @@
 
 namespace arapfields {
 
-/// The rigid motion that maps points closest to their targets in weighted least squares, and the factor by
-/// which it lowers the sum of squares (1: not at all).
+/// The rigid motion that maps points closest to their targets in weighted least squares, and the remaining
+/// fraction of the sum of squares (1: no gain).
 struct Alignment {
   Mat3 rotation = Mat3::Identity();
   Vec3 translation = Vec3::Zero();
   double gain = 1.0;
 };
-/// Points on a line leave the rotation about it undetermined: `tie`, a share of the spread, keeps it small.
+/// `tie`, a fraction of the points' covariance, regularises towards no rotation, which collinear points leave
+/// undetermined about their line.
 Alignment best_alignment(PointsIn points, PointsIn targets, const Vector& weights, double tie = 1e-6);
 
 /// The same motion as a matrix, of points (n,3) → moved (n,3): of all rotations and translations the one with

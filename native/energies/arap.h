@@ -13,7 +13,7 @@ struct ArapValue {
   double stretch_energy = 0.0;  ///< mean w ‖J − R‖², the stretch's part of it
 };
 
-/// What single points count: a factor on each point's energy, and one on its bending. Null: all 1.
+/// Weights of single points: a factor on each point's energy, and one on its bending. Null: all 1.
 template <class Scalar>
 struct ArapFactors {
   const Scalar* weights = nullptr;  ///< (n) w
@@ -24,8 +24,8 @@ struct ArapFactors {
 /// `bending` is 0). R is the rotation closest to J, Y = RᵀJ; with D_k = ∂_k J, w_k = K⁻¹ axl(Rᵀ D_k),
 /// K = tr(Y) I − Y, the bend is Σ_k axl(Rᵀ D_k)·w_k. Adds the cotangents of weight·energy to `cotangents`
 /// (same count; its data may be null: values alone); without factors the energy is stretch + bending·bend.
-/// K's eigenvalues are kept above 0.01, so that reflected and collapsed Jacobians have finite values and
-/// cotangents. The paper's stretch is meant: the authors' package divides it by 3.
+/// K's eigenvalues are clamped to at least 0.01, so that reflected and collapsed Jacobians have finite values
+/// and cotangents. The stretch is the paper's; the authors' package divides it by 3.
 template <class Scalar>
 ARAPFIELDS_EXPORT ArapValue arap_energy(JetView<const Scalar> jets, double bending, double weight,
                                         JetView<Scalar> cotangents, ArapFactors<Scalar> factors = {});

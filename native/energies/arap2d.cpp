@@ -9,7 +9,7 @@
 namespace arapfields {
 namespace {
 
-/// Below this sum of signed singular values the rotation is taken to be ambiguous.
+/// Lower clamp of t, the sum of signed singular values; the closest rotation is ambiguous at 0.
 constexpr double smallest_sum = 0.01;
 
 template <class Scalar>

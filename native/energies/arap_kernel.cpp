@@ -6,7 +6,7 @@
 namespace arapfields::SIMD_LEVEL {
 namespace {
 
-/// Below this eigenvalue of K (a sum of two signed singular values) the rotation is taken to be ambiguous.
+/// Lower clamp of K's eigenvalues, sums of two signed singular values; at 0 R is ambiguous.
 template <class Scalar>
 constexpr Scalar smallest_sum = Scalar(0.01);
 constexpr int second_column[3][3] = {{4, 7, 8}, {7, 5, 9}, {8, 9, 6}};
@@ -25,7 +25,7 @@ inline void axial(const Pack33<Scalar>& m, Pack3<Scalar>& out) {
   out[2] = m[1][0] - m[0][1];
 }
 
-/// K⁻¹ a in K's eigenvectors.
+/// K⁻¹ a, by K's eigenvectors.
 template <class Scalar>
 inline void solve_k(const RotationPack<Scalar>& polar, const Pack3<Scalar>& inverse, const Pack3<Scalar>& a,
                     Pack3<Scalar>& out) {
@@ -46,7 +46,7 @@ inline void rotation_times_cross(const Pack33<Scalar>& r, const Pack3<Scalar>& w
   }
 }
 
-/// Everything the bend of one pack of points needs from one pass to the next.
+/// Intermediate values of the bend of one pack of points, kept for its cotangents.
 template <class Scalar>
 struct Bend {
   Pack33<Scalar> a_matrix[3];  // A_k = Rᵀ D_k
@@ -136,7 +136,7 @@ inline double sum_of_valid(Pack<Scalar> values, std::int64_t valid) {
   return sum;
 }
 
-/// The points' factors; ones where there are none, and beyond the last point.
+/// The points' factors; 1 if `factors` is null, and beyond the last valid point.
 template <class Scalar>
 inline Pack<Scalar> load_factors(const Scalar* factors, std::int64_t point, std::int64_t valid) {
   Pack<Scalar> result = broadcast(Scalar(1));

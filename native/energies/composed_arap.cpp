@@ -45,8 +45,9 @@ std::array<double, 4 * 16> exchanges() {
   return entries;
 }
 
-/// A round turns the pairs (0,1) and (2,3) and then moves columns 0, 2, 3, 1 to 0, 1, 2, 3: after three
-/// rounds every pair has had its turn and all are home. Of (c, c', s, s', −s, −s', 0) this is the matrix.
+/// A round of the cyclic Jacobi method rotates in the planes (0,1) and (2,3), then permutes columns
+/// 0, 2, 3, 1 to 0, 1, 2, 3: after three rounds each pair was rotated once, and the permutations cancel. The
+/// indices of the round's matrix in (c, c', s, s', −s, −s', 0).
 constexpr std::array<Index, 16> turn_entries = {0, 6, 6, 2, 4, 6, 6, 0, 6, 1, 3, 6, 6, 5, 1, 6};
 
 std::array<double, 54> pair_entries() {
@@ -133,7 +134,7 @@ Tensor composed_arap(const Tensor& jets, double bending, double weight, const En
   const ComposedPolar polar = composed_polar(jacobian, tables);
   const Tensor &r = polar.rotation, rt = r.transpose(1, 2);
   const Tensor difference = jacobian - r;
-  // Factors as (n, 1, 1): on the energy, and on the bending, which the energy's one holds for too.
+  // Factors as (n, 1, 1): on the energy, and their product with those on the bending.
   const Tensor one = ones({1, 1, 1}, jets);
   const Tensor factor = factors.weights.defined() ? factors.weights.view({n, 1, 1}) : one;
   const Tensor stiffness = factors.bending.defined() ? factor * factors.bending.view({n, 1, 1}) : factor;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The energies of this folder as compositions of tensor operations, for tensors outside main memory. Nothing
-// is read back, so nothing waits for the device. `jets` and `cotangents` are (columns, n, 3), contiguous;
+// The energies of this folder as compositions of tensor operations, for tensors on a GPU. Nothing is read
+// back, so the host does not wait for the device. `jets` and `cotangents` are (columns, n, 3), contiguous;
 // weight times the cotangents is added to the latter unless they are undefined. Values are means as in
 // arap.h, gauss.h, distortion.h, handles.h and stance.h, as tensors.
 #pragma once
@@ -9,28 +9,28 @@
 
 namespace arapfields {
 
-/// The constants that the compositions select and multiply by. Made once beside a tensor: each is a transfer.
+/// Constant index and coefficient tensors of the compositions, uploaded once to the device of `like`.
 struct EnergyTables {
   explicit EnergyTables(const Tensor& like);
 
   Tensor davenport;    ///< (9, 16): J to Horn's 4×4 matrix
-  Tensor turn;         ///< (16): where a round of Jacobi rotations finds its matrix in (c, s, −s, 0)
-  Tensor diagonal;     ///< (4): places in a 4×4 matrix of its diagonal,
-  Tensor even;         ///< (2): of a round's pairs, (0,0) and (2,2),
-  Tensor odd;          ///< (2): (1,1) and (3,3),
-  Tensor pair;         ///< (2): and (0,1) and (2,3)
-  Tensor exchange;     ///< (4, 4, 4): matrix i exchanges columns i and 0
-  Tensor entries;      ///< (12): of a quaternion, see `left` and `right`
-  Tensor left;         ///< (3, 4): signs of these; R = (left ∘ q)(right ∘ q)ᵀ
+  Tensor turn;         ///< (16): indices of a Jacobi round's 4×4 matrix in (c, c', s, s', −s, −s', 0)
+  Tensor diagonal;     ///< (4): flat indices in a 4×4 matrix of its diagonal,
+  Tensor even;         ///< (2): of the entries (0,0) and (2,2) of a round's planes,
+  Tensor odd;          ///< (2): of (1,1) and (3,3),
+  Tensor pair;         ///< (2): of (0,1) and (2,3)
+  Tensor exchange;     ///< (4, 4, 4): matrix i swaps columns i and 0
+  Tensor entries;      ///< (12): indices of a quaternion's entries, see `left` and `right`
+  Tensor left;         ///< (3, 4): their signs; R = (left ∘ q)(right ∘ q)ᵀ
   Tensor right;        ///< (3, 4)
   Tensor axial;        ///< (9, 3): M to axl(M); transposed, w to [w]×
   Tensor slices;       ///< (9): second_column(j, k) at 3j + k
-  Tensor pairs;        ///< (6, 9): collects these
+  Tensor pairs;        ///< (6, 9): sums the entries of `slices` into the six second-derivative columns
   Tensor identity;     ///< (3, 3)
-  Tensor next_column;  ///< (3): the column of J after k,
-  Tensor last;         ///< (3): and after that
-  Tensor next_axis;    ///< (3): the same without the jets' first column
-  Tensor last_axis;    ///< (3)
+  Tensor next_column;  ///< (3): the jets' column of J's column k + 1 (mod 3),
+  Tensor last;         ///< (3): and of k + 2
+  Tensor next_axis;    ///< (3): k + 1 (mod 3)
+  Tensor last_axis;    ///< (3): k + 2
 };
 
 /// Closest rotations (n,3,3) of Jacobians (n,3,3), and K of each by eigenvectors (columns of axes) and

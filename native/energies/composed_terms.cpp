@@ -26,7 +26,7 @@ Tensor minors_of(const Tensor& jets, const EnergyTables& tables) {
   return cross(index_select(jets, 0, tables.next_column), index_select(jets, 0, tables.last));
 }
 
-/// What a style makes of unit normals (n,3): its loss (n,1), whose gradient is −factor · slope (n,3).
+/// A style's loss (n,1) of unit normals (n,3), whose gradient is −factor · slope (n,3).
 struct NormalLoss {
   Tensor loss, slope;
   double factor;
@@ -107,8 +107,8 @@ Tensor composed_stance(const Tensor& jets, const Tensor& rest, const Tensor& up,
                rises = product(displacements, up.unsqueeze(1));
   const Tensor uneven = rises - sum(touching * rises) / clamp_min(sum(ground), 1e-30);
   const Tensor lifted = touching * uneven;
-  // Of the turn closest to the displacements, what is not about the upward axis; in float64, as the inertia
-  // is inverted.
+  // The rotation vector closest to the displacements, without its vertical component; in float64, since the
+  // inertia tensor is inverted.
   const Tensor arms = (rest - mean_row(rest)).to(NumberType::float64), upward = up.to(NumberType::float64);
   const Tensor size = clamp_min(sum(arms * arms), 1e-30);
   const Tensor inertia =

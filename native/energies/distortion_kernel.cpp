@@ -4,8 +4,7 @@
 #include "energies/rotation_pack.h"
 
 namespace arapfields::SIMD_LEVEL {
-/// Signed singular values from the sums of two that the closest rotation comes with; the smallest has the
-/// determinant's sign.
+/// Signed singular values from K's eigenvalues, their pairwise sums; the smallest has the sign of det J.
 template <class Scalar>
 void distortion_range(const Scalar* jets, std::int64_t count, std::int64_t begin, std::int64_t end,
                       double* out) {

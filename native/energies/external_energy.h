@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Energies of callers, which join a solve.
+// User-defined energies that are added to a solve's objective.
 #pragma once
 
 #include <memory>
@@ -10,15 +10,15 @@
 
 namespace arapfields {
 
-/// A caller's term of the loss of deform or stylize.
+/// A user-defined term of the loss of deform or stylize.
 class ARAPFIELDS_EXPORT ExternalEnergy {
  public:
   virtual ~ExternalEnergy();
   /// The order of the jets that evaluate() needs: first or second.
   virtual JetOrder order() const { return JetOrder::first; }
-  /// The value at rest points (n,3) of the unit cube at which the field has these jets, of order(); adds its
-  /// derivatives by them to the cotangents, which are zero before. Called on the thread that called the
-  /// solver; what it throws comes through.
+  /// The value for rest points (n,3) of the unit cube and the field's jets there, of order(); adds its
+  /// derivatives by the jets to the cotangents, which are zero before. Called on the thread that called the
+  /// solver; exceptions are passed on.
   virtual double evaluate(PointsIn points, const JetView<const double>& jets,
                           const JetView<double>& cotangents) = 0;
 };

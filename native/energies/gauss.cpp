@@ -14,7 +14,7 @@
 namespace arapfields {
 namespace {
 
-/// Those of the cube overlap midway as much as they should at this sharpness.
+/// The paper's sharpness, which suits the cube, and the largest automatic one.
 constexpr double cube_sharpness = 5.0, most_sharpness = 25.0;
 /// Directions closer than 15° are facets of one curved face.
 constexpr double one_face = 0.9659258262890683;

@@ -14,15 +14,15 @@ struct ARAPFIELDS_EXPORT GaussPreference {
   double sharpness = 5.0;  ///< σ
   /// Whether σ follows from the normals; the style's weight and fall-off then do, too.
   bool automatic = false;
-  /// Factor of the style's weight with which styles of many faces turn as much of what there is to turn as
-  /// the cube: the mean angle from a direction to the cube's nearest normal over that to this style's, where
-  /// that is above 1. 1 unless automatic.
+  /// Factor of the style's weight that makes up for the smaller rotations of styles with many faces: the mean
+  /// angle from a direction to the cube's nearest normal over that to this style's, at least 1. 1 unless
+  /// automatic.
   double balance = 1.0;
   double value(const Vec3& normal) const;
   /// (n) values at unit normals (n,3).
   Vector values(PointsIn directions) const;
-  /// (n) falloff_at() for rest normals (n,3) and the nearest preferred normal, so that no wall becomes a
-  /// floor and no shape paper-thin. All 1 unless automatic.
+  /// (n) falloff_at() for rest normals (n,3) and the nearest preferred normal: normals far from all preferred
+  /// ones are left alone, or shapes would become paper-thin. All 1 unless automatic.
   Vector falloff(PointsIn directions) const;
 };
 

@@ -13,7 +13,7 @@ namespace arapfields {
 namespace {
 
 constexpr double rigid_tolerance = 1e-3;
-/// Volume of a target's box, against the cube of its longest edge, below which it is flat.
+/// Volume of a target's box over the cube of its longest edge, below which it counts as flat.
 constexpr double least_volume = 1e-9;
 
 std::string name_of(Index index) { return "handles[" + std::to_string(index) + "]"; }
@@ -122,7 +122,7 @@ BoundHandles::BoundHandles(std::vector<Handle> handles, PointsIn samples) : hand
   }
 }
 
-/// Where a point handle takes hold.
+/// The material point of point handle i: its rest point, or the nearest sample.
 Vec3 BoundHandles::place_of(Index i, PointsIn samples) {
   const Vec3& point = handle(i).rest_point;
   if (samples.rows() == 0) return point;

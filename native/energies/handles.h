@@ -52,9 +52,9 @@ class ARAPFIELDS_EXPORT BoundHandles {
   static constexpr double farthest = 0.5;
 
   BoundHandles() = default;
-  /// Throws InvalidInput that names the handle which is invalid or holds no sample, or a point farther than
-  /// `farthest` sizes of the shape from it. A point outside of the samples' box and farther than `beside`
-  /// from them stands for the nearest of them.
+  /// Throws InvalidInput that names a handle which is invalid, holds no sample, or is a point farther than
+  /// `farthest` sizes from the samples. A point outside of the samples' box and farther than `beside` from
+  /// them is replaced by the nearest sample.
   BoundHandles(std::vector<Handle> handles, PointsIn samples);
 
   Index count() const { return static_cast<Index>(handles_.size()); }
@@ -66,7 +66,7 @@ class ARAPFIELDS_EXPORT BoundHandles {
   /// Index of each pair's sample, −1 for point handles.
   const std::vector<Index>& members() const { return members_; }
   const Mat4& motion(Index i) const { return motions_[i]; }
-  /// How many sizes of the shape a point was brought to reach the surface; 0 where it was not.
+  /// Distance, in sizes of the shape, over which a point handle was moved onto the nearest sample; 0: not.
   double brought(Index i) const { return brought_[static_cast<std::size_t>(i)]; }
 
   /// New targets for the same regions: each handle's target (or target_point) is taken from `moved`.

@@ -17,13 +17,13 @@
 namespace arapfields {
 namespace {
 
-/// Cosine of 30°: triangles that meet at more are faces of their own.
+/// Cosine of 30°, the largest dihedral deviation across which normals are smoothed.
 constexpr double crease = 0.8660254037844387;
 /// Volume over area^1.5 below which a shape counts as flat; a ball has 0.094, a card of 1 : 1 : 0.001 3e-4.
 constexpr double flattest = 1e-5;
-/// How far beyond its edges a triangle still stops a ray, so that none slips through between two.
+/// Tolerance of barycentric coordinates in ray intersection, so that no ray passes between two triangles.
 constexpr double slack = 1e-9;
-/// Rings of directions about the one at hand, six more on each, over which T is averaged.
+/// Rings of directions around the given one, ring k with 6 k of them, over which T is averaged.
 constexpr int rings = 2;
 
 using Corners = std::array<Vec3, 3>;
@@ -33,9 +33,9 @@ Vec3 unit_or_zero(const Vec3& vector) {
   return length > 0.0 ? Vec3(vector / length) : Vec3(Vec3::Zero());
 }
 
-/// Normals at the corners of triangles. Of the triangles about a vertex, those that bend into each other
-/// share one, by the weights that make it exact where vertices lie on a sphere (Max 1999, "Weights for
-/// Computing Vertex Normals from Facet Normals").
+/// Normals at the corners of triangles. Triangles around a vertex that are connected by smooth edges share
+/// one, with weights that make it exact for vertices on a sphere (Max 1999, "Weights for Computing Vertex
+/// Normals from Facet Normals").
 std::vector<Corners> corner_normals(const Points& vertices, const Triangles& triangles) {
   const Index count = triangles.rows();
   std::vector<Vec3> flat(count);
@@ -105,7 +105,7 @@ struct ObjectStyle::Surface {
         for (Vec3& normal : corner) normal = -normal;
   }
 
-  /// The triangles with one vertex a position; throws where they do not close.
+  /// The triangles with vertices welded by position; throws if they are not closed.
   static Triangles welded(PointsIn vertices, TrianglesIn triangles) {
     validate(vertices, triangles);
     require(is_closed(vertices, triangles), "triangles", "they do not close: the style object is open",
@@ -122,7 +122,7 @@ struct ObjectStyle::Surface {
             vertices.row(triangles(t, 2)).transpose()};
   }
 
-  /// Where a ray leaves for the last time: how far out, which triangle, and its corners' shares.
+  /// The last intersection of a ray: its distance, triangle, and barycentric coordinates.
   struct Exit {
     double distance = 0.0;
     Index triangle = -1;
@@ -208,8 +208,7 @@ Points ObjectStyle::normals(PointsIn given, double smoothing) const {
       const Vec3 middle = turn_.transpose() * directions.row(i).transpose();
       const Vec3 side = middle.unitOrthogonal(), other = middle.cross(side);
       Vec3 sum = normal(middle);
-      // Rings of equally spread directions: what they sum to is along the one in their middle, so that the
-      // identity stays the identity.
+      // Evenly spaced directions on rings: their sum is along the central one, so that T = id is preserved.
       for (int ring = 1; smoothing > 0.0 && ring <= rings; ++ring) {
         const double angle = smoothing * ring / rings, share = static_cast<double>(ring) / rings;
         const double weight = std::exp(-2.0 * share * share);

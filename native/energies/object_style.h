@@ -22,7 +22,7 @@ class ARAPFIELDS_EXPORT ObjectStyle {
   Points normals(PointsIn directions, double smoothing = usual_smoothing) const;
   /// The same object rotated about its centroid.
   ObjectStyle turned(const Mat3& turn) const;
-  /// Of the solid, in the mesh's coordinates.
+  /// The solid's centroid, in mesh coordinates.
   Vec3 centroid() const;
 
   static constexpr double usual_smoothing = 0.045;

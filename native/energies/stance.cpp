@@ -11,7 +11,7 @@
 namespace arapfields {
 namespace {
 
-/// Share of the height within which a figure touches the ground, and what that weighs against all else.
+/// Height, as a fraction of the figure's, below which samples are on the ground, and their weight.
 constexpr double ground_height = 0.05, ground_weight = 128.0;
 
 /// lean_weight · Σ‖a‖² · ‖ω − (ω·up) up‖² of samples with arms a (n,3) about their mean, ω being the

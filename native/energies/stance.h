@@ -5,26 +5,26 @@
 
 namespace arapfields {
 
-/// How a figure stands: which way is up, and where it touches the ground.
+/// A figure's stance: its upward direction, and the samples on the ground.
 struct ARAPFIELDS_EXPORT_TO_TESTS Stance {
   Vec3 up = Vec3::UnitZ();
   double scale = 1.0;  ///< one over its squared radius of gyration
   Vector ground;       ///< (n) weights of the samples on the ground, above 0 within 5 % of the height
   static constexpr double lean_weight = 20.0;  ///< of a rotation of the figure about a horizontal axis
-  /// Added to the inertia, as a share of the size squared: a line has no rotation about itself.
+  /// Regularisation of the inertia tensor, as a fraction of the squared size: it is singular for a line.
   static constexpr double thinnest = 1e-9;
 
-  /// Of samples (n,3). Throws InvalidInput for a zero or non-finite direction.
+  /// The stance of samples (n,3). Throws InvalidInput for a zero or non-finite direction.
   static Stance of(PointsIn points, const Vec3& upwards);
-  /// Of some of the samples.
+  /// The stance with the ground weights of these samples alone.
   Stance at(const std::vector<Index>& rows) const;
 };
 
 /// scale · (mean ‖d − d̄‖² + mean ground ((d − d̂)·up)² + lean_weight · mean ‖a‖² · ‖ω − (ω·up) up‖²) with
 /// d = f(x) − x the displacements of samples x (n,3), d̄ their mean, d̂ their mean over the ground, a = x − x̄
-/// and ω the infinitesimal rotation closest to d: how far a surface moves other than by a translation, how
-/// uneven its ground becomes, and how far the figure leans. Rigidity does not penalise these: rotating a leg,
-/// or the figure, has no energy. Adds weight times its cotangents on the value column (data may be null).
+/// and ω the infinitesimal rotation closest to d. The terms penalise displacements other than a translation,
+/// unevenness of the ground, and leaning; the ARAP energy does not, since a rotating leg, or figure, is
+/// rigid. Adds weight times its cotangents on the value column (data may be null).
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double stance_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest,
                                                 const Stance& stance, double weight,

@@ -8,12 +8,12 @@
 namespace arapfields {
 namespace {
 
-/// Of ‖ñ − t‖² against 1 − g: near a preferred normal 1 − g is 5/2 ‖ñ − n_k‖² at the cube's sharpness;
-/// somewhat more, since targets are fixed, lets a cube's style reach the same mean g.
+/// Weight of ‖ñ − t‖² relative to 1 − g, which near a preferred normal is 5/2 ‖ñ − n_k‖² at the cube's
+/// sharpness; a little more, as targets are fixed, gives a cube's style the same mean g.
 constexpr double target_factor = 3.0;
-/// Sharpness at which an object is smoothed as usual, and the widest smoothing.
+/// Sharpness that stands for ObjectStyle::usual_smoothing, and the largest smoothing, in radians.
 constexpr double usual_sharpness = 5.0, widest = 0.8;
-/// Directions this near to each other are the same to the precision of meshes in text files.
+/// Distance of unit vectors that count as equal: the precision of meshes in text files.
 constexpr double same = 1e-4;
 
 }  // namespace

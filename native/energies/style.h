@@ -8,7 +8,7 @@
 
 namespace arapfields {
 
-/// What normals are to turn to: preferred ones (k,3), or what an object has in their direction.
+/// A style: preferred normals (k,3), or the map of directions T of an object.
 struct Style {
   Style(Points normals) : preferred(std::move(normals)) {}
   Style(ObjectStyle of) : object(std::move(of)) {}
@@ -20,15 +20,15 @@ struct Style {
 /// A style at n samples.
 struct StyleAtSamples {
   std::optional<GaussPreference> preference;  ///< none: targets
-  Points targets;                             ///< (n,3) preferred unit normals of an ObjectStyle; or none
-  Vector weights;                             ///< (n) how much each sample is to follow
+  Points targets;                             ///< (n,3) unit normals T(n) of an ObjectStyle; or empty
+  Vector weights;                             ///< (n) weight of the style at each sample
   double factor = 1.0;                        ///< of the style's weight
 
-  /// At samples with these rest normals (n,3). Of an object's style the sharpness says how little it is
-  /// smoothed; 0 is as 5. Throws InvalidInput as gauss_preference() does.
+  /// At samples with these rest normals (n,3). An object's map is smoothed less the larger the sharpness is;
+  /// 0 stands for 5. Throws InvalidInput as gauss_preference() does.
   static StyleAtSamples of(const Style& style, PointsIn normals, double sharpness);
   bool any() const { return preference.has_value() || targets.rows() > 0; }
-  /// Whether the normals are as they should be already: a sphere's style, or none.
+  /// Whether the rest normals are at their targets already, as with a sphere's style or none.
   bool idle(PointsIn normals) const;
 };
 
@@ -42,7 +42,7 @@ double style_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
   return target_energy<Scalar>(jets, normals, targets, sample_weights, weight, cotangents);
 }
 
-/// What reports call the preference: the mean of g, or the mean of ñ·t, from style_energy() with weights 1.
+/// The preference in reports, mean g or mean ñ·t, from style_energy() with weights 1.
 inline double preference_of(const std::optional<GaussPreference>& preference, double style_energy) {
   return 1.0 - (preference ? 1.0 : 0.5) * style_energy;
 }

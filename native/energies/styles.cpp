@@ -29,7 +29,7 @@ Rows prism(int sides) {
   return rows;
 }
 
-/// Its sides lean inwards: their normals rise by 30° above the base plane.
+/// Face normals of a pyramid with this many sides, which rise by 30° above the base plane.
 Rows pyramid(int sides) {
   Rows rows = ring(sides, std::numbers::pi / 6.0);
   rows.emplace_back(0, 0, -1);

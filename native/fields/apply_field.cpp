@@ -10,7 +10,7 @@
 namespace arapfields {
 namespace {
 
-/// How far from the surface, in sizes of it, and what share of the points may lie beyond.
+/// Largest distance from the surface, in sizes of it, and the fraction of the points that may be beyond.
 constexpr double near_share = 0.1, most_outside = 0.1;
 
 }  // namespace
@@ -23,7 +23,7 @@ Points apply_field(const DeformationField& field, PointsIn points, double streng
     const double near = near_share * body_size(rest);
     const Points placed = field.frame().to_cube(points);
     const Vector distances = nearest_distances(rest, placed);
-    // What is deep inside, teeth and bones, lies in the box around the surface.
+    // Points deep inside, such as teeth and bones, are in the surface's bounding box.
     const Eigen::RowVector3d low = rest.colwise().minCoeff(), high = rest.colwise().maxCoeff();
     Index outside = 0;
     for (Index i = 0; i < points.rows(); ++i)

@@ -15,9 +15,9 @@ struct ARAPFIELDS_EXPORT CurveBasis {
   RowMatrix<double> rows(Points2In points) const;
 };
 
-/// Centers at the nodes of a grid that have a point within a cell and a half, and at all nodes of one three
-/// times as coarse over the points' surroundings; each twice its grid's spacing wide. A curve's own points
-/// would be poor centres: straight on a line, no bump centred on it has a slope across.
+/// Centers at the nodes of a grid that have a point within 1.5 cells, and at all nodes of a grid three times
+/// as coarse around the points; radii are twice the grid's spacing. Centers on the curve itself would be
+/// poor: on a straight line, their functions have no derivative across it.
 ARAPFIELDS_EXPORT CurveBasis curve_basis(Points2In points, double spacing);
 
 /// A deformation of the plane, made for a curve. Points are in the curve's coordinates; the basis lives in
@@ -28,8 +28,7 @@ struct ARAPFIELDS_EXPORT CurveField {
   CurveBasis basis;
   RowMatrix<double> coefficients;  ///< (size,2)
 
-  /// The field that moves nothing, for this curve. Throws InvalidInput for no points, non-finite ones, one
-  /// place.
+  /// The identity, for this curve. Throws InvalidInput for no points, non-finite ones, or a single position.
   static CurveField around(Points2In points, double spacing);
   Points2 to_square(Points2In points) const { return (points.rowwise() - center.transpose()) / scale; }
   Points2 operator()(Points2In points) const;

@@ -12,15 +12,15 @@ namespace arapfields {
 
 class Tensor;
 
-/// A deformation f: R³ → R³ of the unit cube's space that knows its jets: all that energies, extraction and
-/// results ask of it. The frame says where the cube lies in mesh coordinates.
+/// A deformation f: R³ → R³ in the coordinates of the unit cube, with its jets: the interface for energies,
+/// extraction and results. The frame maps the cube to mesh coordinates.
 class ARAPFIELDS_EXPORT DeformationField {
  public:
   virtual ~DeformationField() = default;
   /// Jets at points (n,3), all in cube coordinates; `out` has count n and any order. Batched and parallel.
   virtual void evaluate(PointsIn points, JetView<double> out) const = 0;
-  /// Jets (columns, n, 3) at points (n,3), in their dtype and on their device. Fields that live there compute
-  /// them there; those of others come by evaluate().
+  /// Jets (columns, n, 3) at points (n,3), in their dtype and on their device: computed there by fields on
+  /// the same device, else by evaluate().
   virtual Tensor jets(const Tensor& points, JetOrder order) const;
 
   /// Deformed positions of points (n,3), all in mesh coordinates.
@@ -30,14 +30,14 @@ class ARAPFIELDS_EXPORT DeformationField {
     return frame_.to_mesh(values);
   }
 
-  /// Whether preimages() knows f⁻¹ in closed form.
+  /// Whether f⁻¹ has a closed form, preimages().
   virtual bool has_preimages() const { return false; }
-  /// f⁻¹ at points (n,3), all in cube coordinates; only where has_preimages().
+  /// f⁻¹ at points (n,3), all in cube coordinates; only if has_preimages().
   virtual Points preimages(PointsIn points) const { return Points(points.rows(), 3); }
 
   const Frame& frame() const { return frame_; }
   void set_frame(const Frame& frame) { frame_ = frame; }
-  /// Points (n,3) of the rest surface in cube coordinates, near which inverses are looked for; may be empty.
+  /// Points (n,3) of the rest surface in cube coordinates: starting points of NewtonInverse; may be empty.
   const Points& rest_points() const { return rest_points_; }
   void set_rest_points(Points points) { rest_points_ = std::move(points); }
 
@@ -46,11 +46,11 @@ class ARAPFIELDS_EXPORT DeformationField {
   Points rest_points_;
 };
 
-/// A field whose parameters a first-order method can train: it pulls the cotangents of its jets back to them.
-/// Tensors live on the field's device and have its dtype.
+/// A field whose parameters a first-order method can train, with the pull-back from cotangents of its jets to
+/// the parameters' gradient. Tensors are on the field's device and have its dtype.
 class ARAPFIELDS_EXPORT TrainableField : public DeformationField {
  public:
-  /// Jets (columns, n, 3) at points (n,3); keeps what pull_back needs until the next call.
+  /// Jets (columns, n, 3) at points (n,3); stores the activations for pull_back() until the next call.
   virtual Tensor forward(const Tensor& points, JetOrder order) = 0;
   /// The same at points in main memory; never waits for the field's device.
   virtual Tensor forward_at(PointsIn points, JetOrder order) = 0;
@@ -59,7 +59,7 @@ class ARAPFIELDS_EXPORT TrainableField : public DeformationField {
   /// All parameters, and their gradient, as one contiguous vector (p).
   virtual Tensor& parameters() = 0;
   virtual Tensor& gradient() = 0;
-  /// The matrices among the parameters, for optimizers that treat them as such.
+  /// The places of matrices among the parameters, for optimizers of matrices (optimize/muon.h).
   virtual std::vector<MatrixPlace> matrices() const { return {}; }
   /// Adds an offset (cube coordinates) to f.
   virtual void translate(const Vec3& offset) = 0;

@@ -11,10 +11,11 @@
 namespace arapfields {
 namespace {
 
-/// Share of the reach within which m is 1.
+/// Fraction of the reach within which m is 1.
 constexpr double core = 0.5;
 
-/// 1 near q = 0 and 0 from q = 1, by the squared distance q in reaches, whose jet is given.
+/// The fall-off as a function of the squared distance q, in squared reaches, whose jet is given: 1 near q =
+/// 0, 0 from q = 1.
 ScalarJet fall_off_of_square(const ScalarJet& q) {
   const double s = std::sqrt(q.c[0]), slope = 1.0 / (1.0 - core);
   const auto [value, first, second] = fall_off((s - core) * slope);
@@ -47,7 +48,7 @@ Influence::Influence(Points places, Vector reaches, std::shared_ptr<const Interi
 
 template <class Consume>
 void Influence::for_each_point(PointsIn points, JetOrder order, Consume&& consume) const {
-  // Interior distances are at least straight ones: most points are beyond every reach.
+  // Interior distances are not below Euclidean ones, which exclude most points.
   std::vector<std::int32_t> near(points.rows());
   parallel_for(0, points.rows(), 1024, [&](Index first, Index last) {
     for (Index p = first; p < last; ++p)

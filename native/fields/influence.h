@@ -8,9 +8,9 @@
 
 namespace arapfields {
 
-/// The influence m(x) of handles with a reach: 1 near their places, 0 beyond the reach of all of them, three
-/// times continuously differentiable between. Distances are measured through the shape's interior where there
-/// is an embedding. f becomes x + m(x) (f(x) − x).
+/// The influence m(x) of handles with a reach, a C³ weight: 1 near their places, 0 beyond the reach of all of
+/// them. Distances are interior distances if there is an embedding, else Euclidean. f is replaced by x + m(x)
+/// (f(x) − x).
 class Influence {
  public:
   /// Places (k,3) with their reaches (k, positive), in the cube. Throws InvalidInput for other numbers.
@@ -18,7 +18,7 @@ class Influence {
 
   /// m at points (n,3).
   Vector at(PointsIn points) const;
-  /// Jets of f at points (n,3) become those of x + m (f − x); where m is 0 exactly those of x.
+  /// Replaces the jets of f at points (n,3) by those of x + m (f − x); exactly those of x where m is 0.
   void confine(PointsIn points, JetView<double> jets) const;
 
   const Points& places() const { return places_; }

@@ -15,9 +15,9 @@
 namespace arapfields {
 namespace {
 
-/// Share of the smaller radius by which a center may lie outside the larger ball.
+/// Distance, as a fraction of the smaller radius, by which a centre may be outside of the larger ball.
 constexpr double overlap_share = 0.25;
-/// Neighbours on one sheet: at most so many spacings apart, normals with at least this cosine.
+/// Neighbours on one sheet: largest distance, in spacings, and least cosine of the normals.
 constexpr double sheet_spacings = 2.5, sheet_cosine = 0.3;
 
 }  // namespace
@@ -44,7 +44,7 @@ InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing, c
   join_parts(nodes);
 }
 
-/// What edges do not connect are parts.
+/// Joins the graph's connected components.
 void InteriorGraph::join_parts(PointsIn nodes) {
   std::vector<Index> parts(edges_.size(), -1), open;
   for (Index start = 0, count = 0; start < size(); ++start) {

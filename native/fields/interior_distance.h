@@ -9,13 +9,14 @@
 
 namespace arapfields {
 
-/// Of two points, by their rows.
+/// A predicate on two points, by their rows.
 using MayJoin = std::function<bool(Index, Index)>;
 
-/// A graph on samples of a surface, with edges where a path inside the shape joins them. Each node has the
-/// largest ball that touches the surface there from inside and holds no other node; two nodes are joined
-/// where one's ball nearly holds the other's center, or where they are neighbours on one sheet. Parts that
-/// nothing joins are joined by the shortest straight lines there are.
+/// A graph on samples of a surface, whose shortest paths approximate distances through the inside of the
+/// shape. Each node has the largest ball that touches the surface there from inside and contains no other
+/// node (its centre approximates the medial axis); two nodes are joined if one's ball nearly contains the
+/// other's centre, or if they are neighbours on one sheet. Connected components are joined by a minimum
+/// spanning tree.
 class InteriorGraph {
  public:
   struct Edge {
@@ -23,14 +24,14 @@ class InteriorGraph {
     float length;
   };
 
-  /// Nodes (n,3), their outward unit normals (n,3), and how far apart neighbours are; `may_join` tells of two
-  /// nodes whether an edge may join them, none: always.
+  /// Nodes (n,3), their outward unit normals (n,3), and the spacing of neighbours; `may_join`: whether an
+  /// edge may join two nodes; none: always.
   InteriorGraph(PointsIn nodes, PointsIn normals, double spacing, const MayJoin& may_join = {});
   Index size() const { return static_cast<Index>(edges_.size()); }
   const std::vector<Edge>& edges(Index node) const { return edges_[node]; }
   /// Lengths (n, sources) of the shortest paths from the first `sources` nodes.
   RowMatrix<double> distances(Index sources) const;
-  /// Lengths (n) of the shortest paths that begin at any node with that node's length; infinity: not there.
+  /// Multi-source shortest paths: lengths (n), given the initial length (n) of each source; infinity: none.
   std::vector<float> distances_from(std::vector<float> start) const;
 
  private:

@@ -15,21 +15,21 @@ namespace arapfields {
 namespace {
 
 constexpr Index most_nodes = 1500, least_nodes = 100, landmarks = 64;
-/// What the graph's paths, which turn at nodes, make of straight lines.
+/// Ratio of straight distances to the lengths of the graph's paths, which zigzag between nodes.
 constexpr double detour = 0.94;
-/// Exceeding lengths count so many times.
+/// Factor on the differences between interior and Euclidean distances.
 constexpr double emphasis = 2.0;
 /// Weight of smoothing against the embedding's values, and the cutoff of a node's neighbours in spacings.
 constexpr double smoothing = 10.0, neighbour_spacings = 3.0;
-/// Spread of ψ, as a share of the shape's size, below which straight lines serve as well.
+/// Spread of ψ, as a fraction of the shape's size, below which Euclidean distances are used.
 constexpr double worthwhile_spread = 0.04;
-/// Nodes whose weight is below e to this power, next to the nearest one's, are left out.
+/// Logarithm of the weight, relative to the nearest node's, below which nodes are skipped.
 constexpr double negligible = -36.0;
 
 using Neighbours = std::vector<std::vector<Index>>;
 
-/// Coordinates (n,3) whose squared distances come closest to the exceeding squares (n, landmarks); the first
-/// rows are the landmarks'.
+/// Landmark multidimensional scaling: coordinates (n,3) whose squared distances best approximate `excess`
+/// (n, landmarks); the first rows are the landmarks.
 Points leading_coordinates(const RowMatrix<double>& excess) {
   const Index count = excess.cols();
   const RowMatrix<double> own = 0.5 * (excess.topRows(count) + excess.topRows(count).transpose());
@@ -89,7 +89,8 @@ RowMatrix<double> fitted_slopes(const Points& nodes, const Points& values, const
   return slopes;
 }
 
-/// Nodes near the plane are put on it, all others followed by their reflections; returns each one's twin.
+/// Projects nodes near the plane onto it and inserts the reflection of each other node after it; returns the
+/// twin of each node.
 std::vector<Index> add_reflections(Points& nodes, Points& normals, int axis, double width) {
   constexpr double node_on_plane = 0.25;
   const Points places = nodes, directions = normals;
@@ -115,7 +116,7 @@ std::vector<Index> add_reflections(Points& nodes, Points& normals, int axis, dou
   return twins;
 }
 
-/// ψ is even or odd across the plane, but for rounding: each coordinate becomes so exactly.
+/// Makes each coordinate of ψ, which is even or odd across the plane up to rounding, exactly so.
 void symmetrise(InteriorEmbedding& embedding, const std::vector<Index>& twins, int axis) {
   const Points values = embedding.values;
   const RowMatrix<double> slopes = embedding.slopes;
@@ -190,7 +191,7 @@ std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, Po
   std::vector<Index> twins;
   if (axis >= 0) twins = add_reflections(embedding.nodes, node_normals, axis, embedding.width);
   const Index n = embedding.nodes.rows();
-  // Landmarks are the first nodes, and no half of a pair.
+  // Landmarks are the first nodes, in complete mirrored pairs.
   const Index count = landmarks + (axis >= 0 && twins[landmarks - 1] == landmarks ? 1 : 0);
   const MayJoin rows_may_join = [&](Index i, Index j) {
     return may_join(chosen.indices[i], chosen.indices[j]);

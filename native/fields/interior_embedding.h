@@ -9,10 +9,10 @@
 
 namespace arapfields {
 
-/// Three smooth functions ψ on R³ that separate parts which are near in space but far apart inside the shape:
-/// |x − y|² + |ψ(x) − ψ(y)|² is about the squared interior distance from x to y. ψ is given with its slope at
-/// nodes of the surface and blended between them, with Gaussian weights as wide as
-/// the nodes are apart and a sum of one (Franke and Little's modification of Shepard's method).
+/// An embedding ψ: R³ → R³ that separates parts which are near in space but far apart inside the shape:
+/// |x − y|² + |ψ(x) − ψ(y)|² approximates the squared interior distance from x to y. ψ is given by values and
+/// gradients at nodes of the surface and blended between them with normalised Gaussian weights, as wide as
+/// the nodes' spacing (Franke and Little's modification of Shepard's method).
 struct ARAPFIELDS_EXPORT InteriorEmbedding {
   Points nodes;              ///< (n,3)
   Points values;             ///< (n,3) ψ at the nodes
@@ -23,12 +23,12 @@ struct ARAPFIELDS_EXPORT InteriorEmbedding {
   void evaluate(PointsIn points, JetView<double> out) const;
 };
 
-/// ψ of a surface from samples (n,3) and their outward normals: the embedding that best explains by how much
-/// interior distances exceed straight ones (landmark multidimensional scaling: de Silva, Tenenbaum 2004).
-/// Null where they hardly do, and for less than a hundred different samples. With an axis (0, 1, 2), samples
-/// lie where that coordinate is positive, stand for their reflections too, and ψ is symmetric: the interior
-/// distances from x to y and from S x to S y are the same. `may_join` tells of two samples whether a way may
-/// lead straight from one to the other, none: always; without an axis.
+/// ψ of a surface from samples (n,3) and their outward normals, by landmark multidimensional scaling (de
+/// Silva, Tenenbaum 2004) of the squared interior distances minus the squared Euclidean ones. Null if these
+/// hardly differ, and for less than a hundred distinct samples. With an axis (0, 1, 2), samples are those
+/// where that coordinate is positive, whose reflections are added, and ψ is symmetric: interior distances
+/// from x to y and from S x to S y are equal. `may_join`: whether an edge of the graph may join two samples;
+/// none: always; without an axis only.
 ARAPFIELDS_EXPORT std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples,
                                                                               PointsIn normals, int axis = -1,
                                                                               const MayJoin& may_join = {});

@@ -51,7 +51,7 @@ class Starts {
     return rest_.row(search.best);
   }
 
-  /// The one than whose image so many others are nearer, or the farthest.
+  /// The point whose image is the (nearer + 1)-th nearest, or the farthest.
   Vec3 next_nearest(const Vec3& image, Index nearer) const {
     Vector squares = (images_.rowwise() - image.transpose()).rowwise().squaredNorm();
     std::vector<Index> order;
@@ -99,7 +99,7 @@ Points grid(int side) {
   return points;
 }
 
-/// One point's state: the best x so far, its residual r = f(x) − y, and the Newton step d from it.
+/// The state of one target's iteration: the best x so far, its residual r = f(x) − y, and its Newton step d.
 struct Walker {
   Index row;
   Vec3 target, start, best, step = Vec3::Zero();
@@ -118,7 +118,7 @@ Vec3 newton_step(const Mat3& jacobian, const Vec3& residual, double longest) {
   return length > longest ? Vec3(step * (longest / length)) : step;
 }
 
-/// Moves all walkers until they arrive or can go no further; every evaluation is one batch.
+/// Iterates all walkers until they converge or fail; each evaluation is one batch.
 void walk(const DeformationField& field, std::vector<Walker>& walkers, const NewtonInverseOptions& options,
           const Progress& progress) {
   constexpr double smallest_damping = 1.0 / 64.0;
@@ -156,7 +156,7 @@ void walk(const DeformationField& field, std::vector<Walker>& walkers, const New
   }
 }
 
-/// f at some of the walkers' starts, from which straight lines lead to their targets.
+/// f at the walkers' starts, where the continuation's lines begin.
 Points values_at_starts(const DeformationField& field, const std::vector<Walker>& walkers,
                         const Progress& progress) {
   Points starts(static_cast<Index>(walkers.size()), 3);
@@ -164,8 +164,8 @@ Points values_at_starts(const DeformationField& field, const std::vector<Walker>
   return values_at(field, starts, progress);
 }
 
-/// From each start x along the line from f(x) to the target, in steps that are halved where Newton's method
-/// does not arrive: where f folds nowhere, there is one way.
+/// Continuation: tracks the preimage of the line from f(start) to the target, in steps that are halved where
+/// Newton's method does not converge. Without folds the preimage is unique.
 void follow_lines(const DeformationField& field, std::vector<Walker>& walkers,
                   const NewtonInverseOptions& options, const Progress& progress) {
   constexpr double first_step = 0.25, least_step = 1.0 / 2048.0;
@@ -211,7 +211,7 @@ struct NewtonInverse::Parts {
 
 namespace {
 
-/// Of a field that knows its inverse; NaN for targets that are not finite.
+/// The result by a closed-form inverse; NaN for targets that are not finite.
 InverseResult exact_inverse(const DeformationField& field, PointsIn targets, const Progress& progress) {
   constexpr Index chunk = 65536;
   InverseResult result{Points(targets.rows(), 3), 0, 0.0};
@@ -252,7 +252,7 @@ InverseResult NewtonInverse::operator()(PointsIn targets, const NewtonInverseOpt
     std::vector<Index> left;
     for (Index i = begin; i < begin + rows; ++i)
       if (targets.row(i).allFinite()) left.push_back(i);
-    // Newton's method from three starts, then along lines from them, then from ever more of the nearest.
+    // Newton's method from three starts, then continuation from them, then both from further starts.
     const int attempts = std::isfinite(options.max_distance) ? 1 : 6 + 2 * further_starts;
     for (int attempt = 0; attempt < attempts && !left.empty(); ++attempt) {
       const int turn = attempt < 6 ? attempt % 3 : attempt % 2;

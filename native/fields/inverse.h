@@ -18,12 +18,11 @@ struct InverseResult {
 /// f at points (n,3) in cube coordinates, in pieces between which `progress` may cancel.
 ARAPFIELDS_EXPORT Points values_at(const DeformationField& field, PointsIn points, const Progress& progress);
 
-/// Solves f(x) = y by Newton's method with the field's own Jacobian, its steps halved until the residual
-/// falls. It starts from that of `rest` whose image is nearest to y, and where that fails from the nearest
-/// image of a grid over [-1,1]³, then from y itself; at last along straight lines from the images of these
-/// starts to y. Where f folds space there are several x: the start then decides. Where the field knows its
-/// inverse in closed form, it is asked instead, for whatever lies however far. Built once for many calls; the
-/// field must outlive it.
+/// Solves f(x) = y by damped Newton iterations with the field's Jacobian. The start is the point of `rest`
+/// with the image nearest to y; if that fails, the grid point of [-1,1]³ with the nearest image, then y
+/// itself; then continuation along straight lines from the images of these starts to y. Where f folds space
+/// there are several solutions, and the start decides. A field's closed-form inverse is used instead if there
+/// is one, at any distance. Built once for many calls; the field must outlive it.
 class ARAPFIELDS_EXPORT NewtonInverse {
  public:
   NewtonInverse(const DeformationField& field, Points rest, const Progress& progress = {});

@@ -18,8 +18,8 @@
 namespace arapfields {
 namespace {
 
-/// Points a block holds, and groups of blocks at most, each with a gradient of its own: both fixed, so that
-/// results do not depend on the number of threads.
+/// Points of a block, and the largest number of groups of blocks, each with a gradient of its own. Both are
+/// constant, so that results do not depend on the number of threads.
 constexpr Index block_points = 48, value_block_points = 256, most_groups = 8;
 
 struct Range {
@@ -53,7 +53,7 @@ void for_each_range(const std::vector<Range>& ranges, const std::function<void(c
 }  // namespace
 
 struct InvertibleField::State {
-  /// What a forward call keeps for the pull-back.
+  /// Activations of a forward call, for the pull-back.
   struct Pass {
     Index count;
     JetOrder order;
@@ -63,7 +63,7 @@ struct InvertibleField::State {
   CouplingShape shape;
   Tensor parameters, gradient;
   CouplingViews views;
-  std::deque<Pass> passes;  // the last one first; a step of a solve has two kinds of them
+  std::deque<Pass> passes;  // buffers, the last used first; an iteration of a solve has two batch sizes
   bool fresh = false;
   // Gradients of the groups but the first.
   std::vector<Tensor> parts;

@@ -11,10 +11,9 @@ namespace arapfields {
 
 class Tensor;
 
-/// f as coupling layers in turns over the axes (neural/coupling_shape.h): det J > 0 everywhere, and f⁻¹ in
-/// closed form, by construction. The identity before training. Computed in main memory; values, there and
-/// back, keep their coordinates in double precision, so that preimages() of evaluate() comes back to some
-/// 1e-6 and better.
+/// f as coupling layers that alternate over the axes (neural/coupling_shape.h): det J > 0 everywhere, and f⁻¹
+/// in closed form, by construction. The identity before training. Computed on the CPU; coordinates are in
+/// double precision in both directions, so that preimages() of evaluate() is accurate to about 1e-6.
 class InvertibleField final : public TrainableField {
  public:
   /// Throws InvalidInput for a shape out of range.

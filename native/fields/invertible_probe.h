@@ -8,7 +8,7 @@
 namespace arapfields {
 
 /// Jets (columns, n, 3) at points (n,3), row by row; for given cotangents (the same size, or none) the flat
-/// parameter gradient; and what preimages() makes of the jets' values.
+/// parameter gradient; and preimages() of the jets' values.
 struct InvertibleProbe {
   Vector jets, gradient;
   Points preimages;

@@ -7,11 +7,11 @@
 namespace arapfields {
 namespace {
 
-/// Share of its radius within which a center is put on the plane: a pair of twins closer than that would tell
-/// nothing more than one.
+/// Distance from the plane, as a fraction of its radius, within which a center is projected onto it: twins
+/// closer than that would be nearly dependent.
 constexpr double nearly_on_plane = 0.08;
-/// Centers on one side, against those of a field that is free: nearly as many unknowns reach its energy to
-/// one percent.
+/// Number of centers on one side, relative to that of a field without symmetry, for an energy within one
+/// percent of its.
 constexpr double half = 0.9;
 
 }  // namespace

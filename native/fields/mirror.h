@@ -12,7 +12,7 @@ namespace arapfields {
 /// other's reflections. Reflections change signs alone, so that symmetry is exact.
 struct Mirror {
   int axis = 0;              ///< 0, 1 or 2
-  std::vector<Index> twins;  ///< (m) the center mirrored to each; a center on the plane is its own
+  std::vector<Index> twins;  ///< (m) the mirrored center of each; one on the plane is its own twin
 
   /// Points or normals (n,3), reflected.
   Points reflected(PointsIn points) const;

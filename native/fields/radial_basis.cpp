@@ -25,7 +25,7 @@ void validate(const InteriorEmbedding& given) {
   require_positive("embedding.width", given.width);
 }
 
-/// The point farthest from the middle, without looking at what lies far outside.
+/// The point farthest from the mean, without outliers.
 Index first_center(PointsIn points) {
   constexpr double far = 3.0;
   if ((points.rowwise() - points.row(0)).cwiseAbs().maxCoeff() == 0.0) return 0;

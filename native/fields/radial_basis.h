@@ -12,14 +12,13 @@ namespace arapfields {
 /// Centers of one size, spread evenly over the surface.
 struct RadialScale {
   Index count = 300;           ///< centers
-  double radius_factor = 4.0;  ///< radius as a multiple of the distance within which every sample has a bump
-  bool two_layers = false;     ///< every other center stands below its neighbour, inside the shape
+  double radius_factor = 4.0;  ///< radius over the fill distance
+  bool two_layers = false;     ///< every other center is below its neighbour, inside the shape
 };
 
-/// How centers are spread over points (n,3) of a surface.
+/// The distribution of centers over points (n,3) of a surface.
 struct RadialLayout {
-  Vector sizes =
-      {};  ///< (n, positive; empty: all 1) how far apart centers are there, and how large: relative
+  Vector sizes = {};  ///< (n, positive; empty: all 1) relative spacing and radius of centers at each point
   Points inner = {};  ///< (n,3; empty: scales have one layer) the point inside the shape below each
 };
 
@@ -41,15 +40,15 @@ struct ARAPFIELDS_EXPORT RadialBasis {
   void set_embedding(std::shared_ptr<const InteriorEmbedding> other);
 };
 
-/// Centers at farthest-point samples of the points, scale by scale (a scale with as many centers as there are
-/// distinct points or more is cut there). Centers on the surface alone have no slope across it: a second
-/// layer lets the motion differ between skin and core. Throws InvalidInput for no points or scales without
-/// centers or radius_factor.
+/// Centers at farthest-point samples of the points, scale by scale, each with at most as many centers as
+/// there are distinct points. Functions centered on the surface have no derivative across it: a second layer
+/// allows different motions of skin and core. Throws InvalidInput for no points or scales without centers or
+/// radius_factor.
 ARAPFIELDS_EXPORT RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales,
                                            const RadialLayout& layout = {});
 
-/// Indices of `count` farthest-point samples, and the largest distance of a point to them; distances are
-/// divided by the sizes (n; empty: all 1) of the points that they are measured from.
+/// Indices of `count` farthest-point samples, and the fill distance: the largest of a point to its nearest
+/// sample. Distances are divided by the sizes (n; empty: all 1) of the samples that they are measured from.
 struct FarthestPoints {
   std::vector<Index> indices;
   double fill_distance = 0.0;

@@ -25,7 +25,7 @@ std::vector<double> center_rows(const RadialBasis& basis) {
   return rows;
 }
 
-/// The middle of the rows' bounding box and the radius of a ball around it that holds them.
+/// The centre of the rows' bounding box and the radius of a ball around it that contains them.
 double ball_of(ConstPointsRef<double> rows, double* center) {
   Eigen::Map<Eigen::RowVector3d> middle(center);
   middle = 0.5 * (rows.colwise().minCoeff() + rows.colwise().maxCoeff());

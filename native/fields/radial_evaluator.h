@@ -18,14 +18,14 @@ class RadialEvaluator {
   static constexpr Index block_size = 16;  ///< points
 
   RadialEvaluator() = default;
-  /// `most`: the highest order that will be evaluated. `embedded`: the basis' embedding of the points, where
-  /// that is known and values are enough.
+  /// `most`: the highest order that will be evaluated. `embedded`: the basis' embedding of the points, if it
+  /// is known and `most` is the value.
   RadialEvaluator(const RadialBasis& basis, PointsIn points, JetOrder most = JetOrder::second,
                   const Points* embedded = nullptr);
   Index size() const { return count_; }
 
-  /// Jets of the field with these coefficients (size, 3): overwrites `out` (count = size(), any order), or
-  /// what it holds of these blocks alone.
+  /// Jets of the field with these coefficients (size, 3), written to `out` (count = size(), any order), for
+  /// all blocks or `of_blocks` alone.
   void evaluate(const RowMatrix<double>& coefficients, JetView<Scalar> out,
                 const std::vector<Index>* of_blocks = nullptr) const;
   /// Adds the pull-back of cotangents of such jets to `gradient` (size, 3).

@@ -12,7 +12,7 @@
 namespace arapfields {
 namespace {
 
-/// Points beyond which it pays to put near ones together.
+/// Number of points above which spatial sorting pays off.
 constexpr Index worth_sorting = 64;
 
 }  // namespace
@@ -54,7 +54,7 @@ Points RadialField::at(PointsIn mesh_points) const {
   Points result = DeformationField::at(mesh_points);
   if (!influence_) return result;
   const Vector influence = influence_->at(frame().to_cube(mesh_points));
-  for (Index i = 0; i < result.rows(); ++i)  // the way to the cube and back rounds
+  for (Index i = 0; i < result.rows(); ++i)  // conversion to the cube and back rounds
     if (influence[i] == 0.0) result.row(i) = mesh_points.row(i);
   return result;
 }

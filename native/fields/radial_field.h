@@ -7,11 +7,11 @@
 
 namespace arapfields {
 
-/// A deformation as a weighted sum of compact centers and an affine map, with analytic jets.
+/// A deformation as a sum of compactly supported radial basis functions and an affine map.
 class ARAPFIELDS_EXPORT RadialField : public DeformationField {
  public:
   /// Coefficients (basis.size(), 3); throws InvalidInput for other shapes, non-finite numbers or radii ≤ 0.
-  /// With an influence, nothing moves where that is 0, to the last bit.
+  /// With an influence, points where it is 0 do not move, exactly.
   RadialField(RadialBasis basis, RowMatrix<double> coefficients,
               std::shared_ptr<const Influence> influence = nullptr);
   void evaluate(PointsIn points, JetView<double> out) const override;
@@ -20,8 +20,8 @@ class ARAPFIELDS_EXPORT RadialField : public DeformationField {
   const RadialBasis& basis() const { return basis_; }
   const RowMatrix<double>& coefficients() const { return coefficients_; }
   const std::shared_ptr<const Influence>& influence() const { return influence_; }
-  /// Whether what is prepared at points for one serves the other: only the coefficients may differ, as those
-  /// of one live session do.
+  /// Whether the fields differ in their coefficients alone, so that they can share data precomputed at
+  /// points.
   bool shares_places_with(const RadialField& other) const;
 
  private:

@@ -11,7 +11,7 @@ namespace arapfields {
 /// Power κ of the centers φ(s) = (1 − s/κ)₊^κ, s = |x − p|²/r²; they vanish at √κ radii.
 constexpr int radial_power = 6;
 
-/// Numbers of a bump: center, 1/r², embedded center, 0.
+/// Numbers stored for a center: position, 1/r², embedded position, 0.
 constexpr int center_stride = 8;
 /// Rows of 16 numbers that a block's embedding has: ψ, its first derivatives, its second ones, and the
 /// products ∂_i ψ · ∂_j ψ, in the order of jets; fewer for jets of lower order.

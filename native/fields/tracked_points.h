@@ -7,15 +7,15 @@
 
 namespace arapfields {
 
-/// Points of mesh coordinates, a mesh's vertices say, that radial fields of one basis move again and again;
-/// in any order, in single precision.
+/// Fixed points in mesh coordinates, such as a mesh's vertices, at which radial fields of one basis are
+/// evaluated repeatedly, in single precision.
 class TrackedPoints {
  public:
   TrackedPoints() = default;
   TrackedPoints(const RadialBasis& basis, const Frame& frame, PointsIn mesh_points);
-  /// What moves them only so far; null: nothing.
+  /// Limits the motion; null: not.
   void set_influence(const std::shared_ptr<const Influence>& influence);
-  /// Where the field with these coefficients takes them, (n,3) in mesh coordinates.
+  /// Positions (n,3) under the field with these coefficients, in mesh coordinates.
   PointsF moved(const RowMatrix<double>& coefficients) const;
   /// Mesh coordinates at rest.
   const Points& rest() const { return rest_; }
@@ -27,7 +27,7 @@ class TrackedPoints {
   RadialEvaluator<float> evaluator_;
   Points rest_;  // mesh coordinates
   std::shared_ptr<const Influence> influence_;
-  Vector shares_;  // of the motion; empty: all of it
+  Vector shares_;  // influence m at the points; empty: all 1
 };
 
 }  // namespace arapfields

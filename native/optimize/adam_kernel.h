@@ -7,8 +7,8 @@
 
 namespace arapfields {
 
-/// Entries [0, count) of parameters, gradient and the two running means. `rate` is the learning rate over the
-/// first mean's correction, `scale` one over the root of the second's.
+/// Entries [0, count) of parameters, gradient and the two running moments. `rate` is the learning rate over
+/// the first moment's bias correction, `scale` one over the square root of the second's.
 template <class Scalar>
 struct AdamBlock {
   Scalar* parameters = nullptr;

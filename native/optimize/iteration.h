@@ -16,13 +16,13 @@ struct LossTerm {
 /// The argument of an observer, after each iteration.
 struct Iteration {
   int number = 0;               ///< iterations done, from 1
-  double loss = 0.0;            ///< the estimate that this iteration lowered
+  double loss = 0.0;            ///< estimate before this iteration's steps
   std::vector<LossTerm> terms;  ///< the parts of the loss, whose sum it is
   double seconds = 0.0;         ///< since the loop began
 };
 
-/// Called after each iteration, on the thread that called: false ends the loop with what was reached
-/// (StopReason::observer). What it throws comes through to the caller. On a device, each call waits for it.
+/// Called after each iteration, on the caller's thread: false ends the loop with the current parameters
+/// (StopReason::observer). Exceptions are passed on. With a GPU, each call waits for the device.
 using IterationObserver = std::function<bool(const Iteration&)>;
 
 }  // namespace arapfields

@@ -46,7 +46,7 @@ struct Muon::State {
   AdamStep adam;
   std::vector<Matrix> matrices;
   std::vector<RowsTask> tasks;
-  bool on_device = false;  // whose queue is filled by one thread
+  bool on_device = false;  // then one thread fills the device's queue
 
   void for_each_task(const std::function<void(const RowsTask&)>& body);
   void for_each_matrix(const std::function<void(Matrix&)>& body);
@@ -80,7 +80,7 @@ Muon::Muon(const Tensor& parameters, const std::vector<MatrixPlace>& matrices, c
     m.polynomial = empty({small, small}, parameters);
     state_->matrices.push_back(m);
   }
-  // The last rows first: their symmetric products are the longest.
+  // The last rows first: they have the longest rows of the lower triangle.
   for (Matrix& m : state_->matrices) {
     const Index rows = m.x.size(0), each = state_->on_device ? rows : rows_a_task;
     for (Index first = (rows - 1) / each * each; first >= 0; first -= each)

@@ -23,7 +23,7 @@ struct MuonOptions {
 /// of an odd polynomial, so that all directions of a layer learn at the same pace.
 class Muon {
  public:
-  /// `matrices` in the order of the parameters (p), which are all else Adam's.
+  /// `matrices` are in ascending order of their places in the parameters; Adam moves all other parameters.
   Muon(const Tensor& parameters, const std::vector<MatrixPlace>& matrices, const MuonOptions& options = {});
   ~Muon();
   Muon(Muon&&) noexcept;

@@ -11,15 +11,15 @@ namespace arapfields {
 
 class Tensor;
 
-/// What no option asks for. Short memories (momentum, betas) suit the few hundred steps of a solve.
+/// Fixed parameters of the optimizers. Momentum and betas are low, for the few hundred steps of a solve.
 struct OptimizerOptions {
   double momentum = 0.8;    ///< of muon
   double adam_share = 0.3;  ///< of muon: the rate of biases and the output layer over the matrices'
   double beta1 = 0.8, beta2 = 0.9;
 };
 
-/// What a first-order method moves: parameters and their gradient, each one contiguous vector, and the
-/// matrices of hidden layers among them, in their order.
+/// Trainable parameters and their gradient, each one contiguous vector, and the places of hidden layers'
+/// matrices in them, ascending.
 struct Trainable {
   Tensor& parameters;
   Tensor& gradient;
@@ -32,7 +32,7 @@ class Optimizer {
  public:
   Optimizer(const Trainable& trained, const TrainingOptions& training, const OptimizerOptions& options);
   ~Optimizer();
-  /// One step at `share` of the learning rate.
+  /// One step with `share` times the learning rate.
   void step(double share);
 
  private:

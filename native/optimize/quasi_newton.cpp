@@ -23,7 +23,7 @@ struct Trial {
   Eigen::VectorX<Scalar> u, cotangents;
 };
 
-/// Minimiser (3.59) of the cubic through two points' values and slopes, kept off the ends of their interval.
+/// Minimiser (3.59) of the cubic Hermite interpolant of two trials, safeguarded from the interval's ends.
 template <class Scalar>
 double cubic_minimum(const Trial<Scalar>& a, const Trial<Scalar>& b) {
   const double d1 = a.slope + b.slope - 3.0 * (a.value - b.value) / (a.t - b.t);
@@ -105,7 +105,7 @@ QuasiNewtonReport QuasiNewton::minimise(const MeasuredObjectiveOf<Scalar>& objec
     progress.report(static_cast<double>(report.iterations) / static_cast<double>(options.iterations));
     RowMatrix<double> step = direction(objective, gradient_);
     double slope = dot(gradient_, step);
-    if (!(slope < 0.0)) {  // the pairs describe another objective
+    if (!(slope < 0.0)) {  // no descent direction: the pairs belong to another objective
       if (pairs_.empty()) break;
       forget();
       continue;

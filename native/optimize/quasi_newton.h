@@ -8,7 +8,7 @@
 
 namespace arapfields {
 
-/// A function of coefficients c (n,3) that sees them through linear measurements u = Φ c alone.
+/// A function of coefficients c (n,3) that depends on them through linear measurements u = Φ c alone.
 template <class Scalar>
 class MeasuredObjectiveOf {
  public:
@@ -21,7 +21,7 @@ class MeasuredObjectiveOf {
   virtual RowMatrix<double> pull_back(const Eigen::VectorX<Scalar>& cotangents) const = 0;
   /// An approximation of the inverse Hessian, times a gradient.
   virtual RowMatrix<double> precondition(const RowMatrix<double>& gradient) const = 0;
-  /// The share of a step du from u that is tried first; `slope` is the function's along it.
+  /// First trial step length of the line search from u along du; `slope` is the directional derivative.
   virtual double first_trial(const Eigen::VectorX<Scalar>& u, const Eigen::VectorX<Scalar>& du,
                              double slope) const {
     static_cast<void>(u), static_cast<void>(du), static_cast<void>(slope);
@@ -37,9 +37,9 @@ class MeasuredObjectiveOf {
 using MeasuredObjective = MeasuredObjectiveOf<double>;
 
 struct QuasiNewtonOptions {
-  Index iterations;         ///< at most so many
-  double tolerance = 1e-4;  ///< stops where a step is expected to gain less than this share of the value
-  double floor = 1e-18;     ///< or less than this
+  Index iterations;         ///< most iterations
+  double tolerance = 1e-4;  ///< converged if the predicted decrease is below this fraction of the value
+  double floor = 1e-18;     ///< or below this
 };
 
 struct QuasiNewtonReport {
@@ -47,15 +47,15 @@ struct QuasiNewtonReport {
   Index evaluations = 0;
   double value = 0.0;
   bool converged = false;
-  bool ended = false;  ///< by the objective
+  bool ended = false;  ///< accepted() returned false
 };
 
 /// Preconditioned L-BFGS. A line search costs no product with Φ, since u is linear in the step. Every
-/// accepted step lowers the value. The pairs of past steps serve the next call too, until forget().
+/// accepted step decreases the value. The quasi-Newton pairs are kept for the next call, until forget().
 class QuasiNewton {
  public:
-  /// Improves c in place, and with it its measurements u (empty: not known yet). Throws Diverged where the
-  /// value at the start is not finite.
+  /// Minimises over c in place, and updates its measurements u (empty: they are computed). Throws Diverged if
+  /// the value at the start is not finite.
   template <class Scalar>
   QuasiNewtonReport minimise(const MeasuredObjectiveOf<Scalar>& objective, const QuasiNewtonOptions& options,
                              RowMatrix<double>& c, Eigen::VectorX<Scalar>& u, const Progress& progress = {});
@@ -65,7 +65,7 @@ class QuasiNewton {
     return minimise(objective, options, c, u, progress);
   }
   void forget() { pairs_.clear(); }
-  /// Where the last call ended.
+  /// The gradient at the end of the last call.
   const RowMatrix<double>& gradient() const { return gradient_; }
 
  private:

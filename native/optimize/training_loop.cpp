@@ -14,18 +14,18 @@
 namespace arapfields {
 namespace {
 
-/// Losses stay where they were computed until a run of them is read at once: a read waits for the device.
+/// Losses on the device where they were computed, read several at a time, since a read waits for the device.
 class Losses {
  public:
   explicit Losses(const Tensor& like)
       : every_(on_device_path(like) ? 25 : 1), run_(upload(zeros({every_}, NumberType::float64), like)) {}
-  /// Whether as many as are read at once are there, the `iteration`-th included.
+  /// Whether the buffer is full after this iteration.
   bool due(int iteration) const { return (iteration + 1) % every_ == 0; }
   void keep(int iteration, const Tensor& loss) {
     run_.select(0, iteration % every_).assign(loss);
     kept_ = iteration + 1;
   }
-  /// Those not read yet: consume(iteration, loss).
+  /// Calls consume(iteration, loss) for all losses not read yet.
   template <class Consume>
   void read(Consume&& consume) {
     const Tensor host = run_.to_host();
@@ -38,7 +38,7 @@ class Losses {
   Tensor run_;
 };
 
-/// One run: what the loop carries from iteration to iteration.
+/// The state of one training run.
 class Run {
  public:
   Run(const Trainable& trained, LoopBody& body, const LoopOptions& options, const Progress& progress)
@@ -106,7 +106,7 @@ class Run {
     });
   }
 
-  /// Reads the losses so far and now and then keeps the parameters, whose loss is finite; whether it did.
+  /// Reads the losses; every ten iterations stores the parameters as the last finite state. Whether it did.
   bool look() {
     constexpr int every = 10;
     read_losses();

@@ -14,54 +14,53 @@ namespace arapfields {
 
 class Tensor;
 
-/// The learning rate over its peak: it rises over the first iterations, is held for a part of the run, and
-/// then falls, so that the last steps average out the noise of the batches.
+/// The learning rate relative to its peak: a linear warm-up, a constant part, and a decay, so that the last
+/// steps average out the noise of the batches.
 struct RateSchedule {
   enum class Fall { linear, half_cosine };
   int warm_up = 0;  ///< iterations
   double hold_fraction = 0.5;
-  double final_share = 0.05;  ///< what is left at the end
+  double final_share = 0.05;  ///< relative rate at the end
   Fall fall = Fall::half_cosine;
 
-  /// Where `done` of the run, in [0, 1], has passed.
+  /// The relative rate at the fraction `done` of the run, in [0, 1].
   double share(int iteration, double done) const;
 };
 
 struct LoopOptions {
-  TrainingOptions training;  ///< the schedule follows the clock where a time budget is ahead
+  TrainingOptions training;  ///< with a time budget, the schedule follows the clock if that is ahead
   OptimizerOptions optimizer;
   RateSchedule schedule;
-  int steps = 1;               ///< of the optimizer that an iteration takes, at one rate
-  IterationObserver observer;  ///< none: nothing is read for it
+  int steps = 1;               ///< optimizer steps in an iteration, with the same rate
+  IterationObserver observer;  ///< none: losses are read from a device less often
 };
 
 /// A loss of parameters, estimated at each iteration on a new random subset.
 class LoopBody {
  public:
   virtual ~LoopBody() = default;
-  /// Adds the gradient of the estimate to the gradient, which is zero before; returns the estimate, one
-  /// number wherever it was computed. Asked once a step of the iteration.
+  /// Adds the gradient of the estimate to the gradient, which is zero before; returns the estimate, a scalar
+  /// on the device where it was computed. Called for each step of an iteration.
   virtual Tensor accumulate(int iteration) = 0;
-  /// Asked every ten iterations or so: whether the parameters as they are suffice.
+  /// Whether the current parameters suffice; called about every ten iterations.
   virtual bool is_good_enough() { return false; }
   /// After each iteration, of which `count` are done.
   virtual void iterated(int count) { static_cast<void>(count); }
   /// The weighted terms of the last estimate, for an observer.
   virtual std::vector<LossTerm> terms() const { return {}; }
-  /// What a progress report says.
+  /// The message of a progress report.
   virtual std::string message(int count, double loss, double seconds_left) const = 0;
 };
 
-/// A loop met NaN or infinity. The parameters are those of the last good state, to which `result` belongs.
+/// A loss became NaN or infinite. The parameters are those of the last finite state, as is `result`.
 class LoopDiverged : public Diverged {
  public:
   LoopDiverged(const std::string& what, LoopResult last) : Diverged(what), result(std::move(last)) {}
   LoopResult result;
 };
 
-/// Minimises. Losses that a device computes are read a few dozen at a time, so that the loop does not wait
-/// for it. Throws LoopDiverged, which names the iteration where NaN or infinity was met and the one that was
-/// kept.
+/// Runs the training loop. Losses on a device are read a few dozen at a time, so that the host does not wait
+/// for it. Throws LoopDiverged, which names the iteration with NaN or infinity and the one that was kept.
 LoopResult run_training(const Trainable& trained, LoopBody& body, const LoopOptions& options,
                         const Progress& progress);
 

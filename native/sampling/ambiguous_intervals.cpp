@@ -15,9 +15,9 @@ namespace {
 // of the points are below half of this; the 99 % point is 0.5 to 1.4 times it.
 constexpr double curvature_factor = 5.0;
 constexpr int nodes = 5;             // parameters of a piece at which p is evaluated, both ends included
-constexpr double zero_piece = 0.01;  // where Φ is exactly 0 at both ends, no shorter one is looked into
+constexpr double zero_piece = 0.01;  // pieces with Φ = 0 at both ends are not split below this length
 constexpr std::size_t most_pieces_a_line = 512, fewest_pieces = 4096;
-constexpr double most_pieces = 1 << 25;  // at most so many in memory, were all of them needed
+constexpr double most_pieces = 1 << 25;  // bound of the pieces in memory
 
 /// A piece of a line with Φ known at both ends.
 struct Piece {
@@ -29,8 +29,8 @@ struct Piece {
 
 enum class Roots { none, zero, one, unknown };
 
-/// How many zeros Φ has in the piece, as far as p and Φ at both ends bound it. Sets `split` and, for one
-/// zero, the bracket's guess and slope.
+/// The number of zeros of Φ in the piece, as far as the bounds by p and by Φ at both ends decide it. Sets
+/// `split` and, for one zero, the bracket's guess and slope.
 Roots classify_interval(const TricubicSurrogate& model, const Line& line, Piece& piece, double finest,
                         Bracket& bracket) {
   const double length = piece.high - piece.low, fa = piece.low_value, fb = piece.high_value;
@@ -74,7 +74,7 @@ Roots classify_interval(const TricubicSurrogate& model, const Line& line, Piece&
     if (i > 0) bend = std::max(bend, std::abs(q[i + 1] - 2.0 * q[i] + q[i - 1]) / step);
     if (i > 0 && std::abs(q[i]) < std::abs(q[nearest])) nearest = static_cast<int>(i);
   }
-  // How far the residual and its slope may be from their chord: by its slope alone, or by its curvature.
+  // Bounds of the deviation of the residual and its slope from their chord: by its slope, or its curvature.
   const double bow = curvature_factor * length / model.spacing();
   const double deviation = slope_error * length * std::min(0.5, 0.125 * bow);
   const double slope_deviation = slope_error * std::min(2.0, 0.5 * bow);
@@ -105,7 +105,7 @@ VectorF evaluate_at(EvaluationCounter& function, const std::vector<Line>& lines,
   return function.values(points);
 }
 
-/// Some of the intervals, whose pieces fit in memory.
+/// Resolves some of the intervals, as many as fit in memory.
 void resolve(EvaluationCounter& function, const TricubicSurrogate& model, const std::vector<Line>& lines,
              std::span<const AmbiguousInterval> ambiguous, double finest, double& zero_length,
              std::vector<Bracket>& found) {

@@ -10,7 +10,7 @@
 namespace arapfields {
 namespace {
 
-/// Radii of gyration beyond which a point counts as if it were at that distance.
+/// Radius, in radii of gyration, to which outliers are projected.
 constexpr double far = 3.0;
 
 }  // namespace
@@ -23,7 +23,7 @@ std::vector<std::uint32_t> canonical_order(PointsIn points) {
   for (Index i = 0; i < n; ++i) placed.row(i) *= std::min(1.0, far / std::max(placed.row(i).norm(), 1e-300));
   const Mat3 axes = symmetric_eigen3(Mat3(placed.transpose() * placed)).vectors;
   placed = (placed * axes).eval();
-  for (int k = 0; k < 3; ++k)  // an axis points to where the shape reaches further out
+  for (int k = 0; k < 3; ++k)  // axes are oriented by the sign of the third moment
     if (placed.col(k).array().cube().sum() < 0.0) placed.col(k) *= -1.0;
   return morton_order(placed);
 }

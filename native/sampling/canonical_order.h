@@ -13,7 +13,7 @@ namespace arapfields {
 /// hardly changes when a few outliers are added.
 std::vector<std::uint32_t> canonical_order(PointsIn points);
 
-/// `count` of the list's entries in equal steps (all of them where it has no more).
+/// `count` evenly spaced entries of the list, or all if it has no more.
 std::vector<Index> evenly(const std::vector<std::uint32_t>& list, Index count);
 
 }  // namespace arapfields

@@ -8,13 +8,13 @@ namespace arapfields {
 namespace {
 
 constexpr int max_rounds = 40;
-constexpr int max_gradients = 3;  // gradients a zero, where rounding keeps Φ above the tolerance
+constexpr int max_gradients = 3;  // gradients for each zero, if rounding keeps |Φ| above the tolerance
 constexpr double acceptable_value = 1e-4;
 // A secant step from here is expected to end below the tolerance: the next evaluation takes the gradient.
 constexpr double near_tolerance = 3e-4;
 constexpr double narrowest_bracket = 1e-8;
 
-/// One bracket on its way to its zero.
+/// The state of the root search in one bracket.
 struct RootSearch {
   Index bracket = 0;
   int low_sign = 0;              // of Φ at low
@@ -27,7 +27,7 @@ struct RootSearch {
   bool wants_gradient = false;  // the next evaluation takes the gradient
   bool done = false;
 
-  /// Takes in Φ(t) and its slope there and chooses the next parameter.
+  /// Updates the bracket with Φ(t) and its slope, and chooses the next parameter.
   void step_to_next(double value, double new_slope) {
     slope = new_slope;
     ((value < 0.0 ? -1 : 1) == low_sign ? low : high) = t;

@@ -11,16 +11,16 @@ inline constexpr double finest_interval = 2e-4;
 
 /// Evaluates Φ in the ambiguous intervals until every crossing there has its bracket. All intervals are
 /// bisected at once. An interval is done when Φ − p, known at its ends and bounded in slope, excludes a
-/// second zero or any, or when it is shorter than `finest`. Two zeros of Φ within that length may be missed,
-/// and those between close places where Φ is exactly 0; the lengths of these are added to `zero_length`.
-/// Throws InvalidInput where there are more intervals than a surface has: Φ varies like noise.
+/// second zero or any, or when it is shorter than `finest`. Pairs of zeros within that length may be missed,
+/// and zeros between near points with Φ = 0 exactly; the lengths of these are added to `zero_length`.
+/// Throws InvalidInput if there are more intervals than a surface can have: Φ is noise.
 std::vector<Bracket> resolve_ambiguous(EvaluationCounter& function, const TricubicSurrogate& model,
                                        const std::vector<Line>& lines,
                                        const std::vector<AmbiguousInterval>& ambiguous,
                                        double finest = finest_interval, double* zero_length = nullptr);
 
 struct Crossings {
-  std::vector<Index> bracket;  ///< which bracket each belongs to, ascending
+  std::vector<Index> bracket;  ///< bracket of each point, ascending
   PointsF points;              ///< (n,3)
   PointsF gradients;           ///< (n,3) of Φ
   double largest = 0.0;        ///< largest |Φ| of the points

@@ -31,9 +31,8 @@ class EvaluationCounter {
 
 /// A bound on |∇Φ| over the cube: the largest of a stratified sample of gradients (strata³ of them,
 /// jittered), times a safety factor of 1.25. The largest of 40,000 gradients of the published networks
-/// is 1.04 to 1.23 times what such a sample sees. TricubicSurrogate raises the bound where grid values
-/// contradict it. Of a function that is not continuous the steepest tenth, which may be jumps, does not
-/// count.
+/// is 1.04 to 1.23 times that of such a sample. TricubicSurrogate raises the bound if grid values contradict
+/// it. For a discontinuous function the steepest tenth, which may be at jumps, is left out.
 double measure_lipschitz(EvaluationCounter& function, int strata = 12);
 
 }  // namespace arapfields

@@ -11,9 +11,9 @@
 namespace arapfields {
 namespace {
 
-/// Of squares in single precision.
+/// Relative tolerance of squared distances in single precision.
 constexpr float rounding = 1e-4f;
-/// Where samples are put that meet nothing.
+/// Coordinate of samples that are not open.
 constexpr float nowhere = 1e15f;
 
 }  // namespace

@@ -9,20 +9,20 @@
 
 namespace arapfields {
 
-/// Runs of samples that are compact at rest, and which of them meet elsewhere.
+/// A broad phase for self-contact: groups (runs) of samples that are compact at rest, and the search for
+/// pairs of runs whose samples face each other in a deformed shape.
 class ARAPFIELDS_EXPORT_TO_TESTS FacingRuns {
  public:
   static constexpr Index run = RowBoxes<4>::run;
-  /// For coordinates of samples at rest (n,8). Those whose rows differ by less than `far` do not meet.
+  /// For rest coordinates of samples (n,8). Pairs whose rows have a distance below `far` are excluded.
   FacingRuns(RowMatrix<double> rest, double far);
   Index count() const { return (std::ssize(order_) + run - 1) / run; }
   std::span<const Index> samples(Index k) const {
     return std::span(order_).subspan(static_cast<std::size_t>(k * run),
                                      static_cast<std::size_t>(std::min(run, std::ssize(order_) - k * run)));
   }
-  /// For each run those with a sample that meets one of its own: within `near` of it at places (n,3), with
-  /// normals whose cosine is at most `facing`. `normals` (n,3) of length 1, or empty: all do. Samples that
-  /// are not `open` meet nothing.
+  /// For each run the runs with a sample within `near` of one of its own, at places (n,3), with the cosine of
+  /// their normals at most `facing`. `normals` (n,3) of length 1; empty: any. Only `open` samples count.
   std::vector<std::vector<Index>> meeting(PointsIn places, const Points& normals,
                                           const Eigen::Array<bool, Eigen::Dynamic, 1>& open, double near,
                                           double facing) const;
@@ -38,16 +38,16 @@ class ARAPFIELDS_EXPORT_TO_TESTS FacingRuns {
   };
   struct Ball {
     Eigen::Array<float, 8, 1> middle;
-    float left;  // what its radius leaves of half the distance that is far
+    float left;  // half of `far` minus the radius
   };
   struct Limits {
-    float near;  // of squares
+    float near;  // squared
     float facing;
-    float far;  // of squares
+    float far;  // squared
   };
   static bool meet(const Rest& rest_a, const Rest& rest_b, const Now& a, const Now& b, const Limits& limits);
 
-  std::vector<Index> order_;              // of samples, as they lie together at rest
+  std::vector<Index> order_;              // spatial order of the samples at rest
   std::vector<std::vector<Ball>> balls_;  // at rest, for each level of boxes
   std::vector<Rest> rest_;
   float far_;

@@ -13,11 +13,11 @@ namespace arapfields {
 namespace {
 
 constexpr Index most_nodes = 1500, most_witnesses = 6000;
-/// Of the radius of gyration.
+/// The limits, as fractions of the radius of gyration.
 constexpr double most_share = 0.6, least_share = 0.02;
-/// Share of a ball's radius by which a point may lie outside it.
+/// Distance, as a fraction of a ball's radius, by which a point may be outside of it.
 constexpr double overlap_share = 0.25;
-/// Inner balls: how flat a witness may be, and within how many spacings of witnesses sides face each other.
+/// InnerBallRules: least_cosine, and `near` in spacings of the witnesses.
 constexpr double least_cosine = 0.2, facing_spacings = 3.0;
 /// Values are averaged within so many thicknesses, and blended between nodes within so many spacings.
 constexpr double smooth_share = 0.5, blend_spacings = 1.0;
@@ -34,7 +34,7 @@ LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::ve
   nodes_ = samples(chosen, Eigen::all);
   const Points node_normals = normals(chosen, Eigen::all);
   const Points witnesses = samples(seen, Eigen::all), witness_normals = normals(seen, Eigen::all);
-  // A sphere's area by its radius of gyration: spacings need no more than its order of magnitude.
+  // The square root of a sphere's area of this radius of gyration: spacings need only its order of magnitude.
   const double side = 3.5 * gyration;
   spacing_ = side / std::sqrt(static_cast<double>(nodes_.rows()));
   const double witness_spacing = side / std::sqrt(static_cast<double>(witnesses.rows()));
@@ -84,7 +84,7 @@ Vector LocalThickness::at(PointsIn points) const {
   parallel_for(0, points.rows(), 64, [&](Index first, Index last) {
     Vector squares(n);
     for (Index i = first; i < last; ++i) {
-      // Of a part, which cannot be resized: GCC 12 for ARM takes that for a use of freed memory.
+      // head(n) cannot be resized: for `squares` itself, GCC 12 for ARM warns of a use of freed memory.
       squares.head(n).array() = (nodes.col(0) - points(i, 0)).square() +
                                 (nodes.col(1) - points(i, 1)).square() +
                                 (nodes.col(2) - points(i, 2)).square();

@@ -15,13 +15,13 @@ namespace arapfields {
 /// ball, as on open sheets and where normals point inwards.
 class LocalThickness {
  public:
-  /// From samples (n,3) of a surface and their outward unit normals (n,3); without normals it is the largest
-  /// value everywhere. `order` lists the samples so that neighbours follow each other.
+  /// From samples (n,3) of a surface and their outward unit normals (n,3); without normals it is the upper
+  /// limit everywhere. `order` is a spatially coherent permutation of the samples.
   LocalThickness(PointsIn samples, PointsIn normals, const std::vector<std::uint32_t>& order);
 
   /// At points (m,3) of the surface.
   Vector at(PointsIn points) const;
-  /// Half of the surface is thinner.
+  /// The median over the surface.
   double median() const { return median_; }
 
  private:

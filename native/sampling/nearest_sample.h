@@ -9,14 +9,14 @@
 
 namespace arapfields {
 
-/// The soup of triangles that are samples (n,3) of a surface: the nearest of them is the nearest sample.
+/// The distance to samples (n,3) of a surface, as degenerate triangles: the closest triangle is the sample.
 SignedDistance nearest_samples(PointsIn samples, const Progress& progress = {});
 
 /// Distances (p) of points (p,3) to the nearest sample.
 Vector nearest_distances(PointsIn samples, PointsIn points, const Progress& progress = {});
 
-/// About the length of a body, from samples of it: 2.5 radii of gyration, which no turn changes and small
-/// things far away hardly do; 1 where all samples are one.
+/// The approximate length of a body: 2.5 radii of gyration of its samples, which is invariant under rotation
+/// and insensitive to small outliers; 1 if all samples coincide.
 double body_size(PointsIn samples);
 
 }  // namespace arapfields

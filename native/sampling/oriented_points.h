@@ -18,8 +18,8 @@ class ARAPFIELDS_EXPORT_TO_TESTS OrientedPoints {
   OrientedPoints(PointsIn points, PointsIn normals);
 
   Index size() const { return points_.rows(); }
-  /// For each of the others (m,3), the point (m) with the least |p − q|² + turn² |n − m|². On all threads.
-  /// Guesses, as those of a like query, shorten the search.
+  /// For each of the others (m,3), the point (m) that minimises |p − q|² + turn² |n − m|². On all threads.
+  /// `guesses`, such as the result of a similar query, shorten the search.
   std::vector<Index> nearest(PointsIn others, PointsIn normals, double turn,
                              const std::vector<Index>& guesses = {}) const;
   /// Points within a distance of a place, in no order.
@@ -47,7 +47,7 @@ class ARAPFIELDS_EXPORT_TO_TESTS OrientedPoints {
 /// Calls visit(row of the tree) for all points that may lie within √square, which it may lower.
 template <class Visit>
 void OrientedPoints::search(const Vec3& place, double& square, Visit&& visit) const {
-  // One subtree a level is still to be visited, and each level halves the points.
+  // At most one subtree a level is pending, and each level halves the points.
   constexpr std::size_t most_levels = 64;
   constexpr double rounding = 1e-14;  // of sums of squares
   struct Pending {

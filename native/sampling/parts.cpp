@@ -11,9 +11,9 @@
 namespace arapfields {
 namespace {
 
-/// The cells, as a share of the extent, by which the spacing is first guessed.
+/// Cell size, as a fraction of the extent, of the grid for the first estimate of the spacing.
 constexpr double coarse_share = 0.1;
-/// The longest step within a part, in medians of the distances to a nearest point.
+/// Threshold of single-linkage clustering, in median distances to the nearest point.
 constexpr double longest_step = 6.0;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
@@ -27,12 +27,12 @@ void near_points(const PointGrid& grid, Index cell, PointsIn points, Index i, Vi
   });
 }
 
-/// The median of the distances to a nearest point; 0 where all points are one.
+/// The median distance to the nearest point; 0 if all points coincide.
 double spacing_of(PointsIn points) {
   const double extent = (points.colwise().maxCoeff() - points.colwise().minCoeff()).maxCoeff();
   const auto count = static_cast<double>(points.rows());
   if (!(extent > 0.0)) return 0.0;
-  const PointGrid coarse(points, coarse_share * extent);  // about a square of the surface lies in each cell
+  const PointGrid coarse(points, coarse_share * extent);  // a cell holds about its size squared of the area
   const PointGrid grid(points, coarse_share * extent * std::sqrt(static_cast<double>(coarse.size()) / count));
   const std::vector<Index> cells = grid.cell_of_each();
   std::vector<double> squares(cells.size(), std::numeric_limits<double>::infinity());

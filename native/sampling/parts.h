@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Parts of a surface that are apart.
+// Disconnected parts of a sampled surface.
 #pragma once
 
 #include <utility>
@@ -9,11 +9,10 @@
 
 namespace arapfields {
 
-/// The part, from 0 on, that each point (n,3) of a surface lies in: points are of one part where steps of a
-/// few spacings lead from one to the other.
+/// The part of each point (n,3) of a surface: single-linkage clusters with a threshold of a few spacings.
 std::vector<Index> parts_of(PointsIn points);
 
-/// Rows of points in two parts: that of the part which is joined already, and the other's nearest one.
+/// Rows of the nearest points of two parts; the first one's part is joined already.
 using PartLink = std::pair<Index, Index>;
 
 /// The shortest lines that join all parts to those in `joined`, a minimum spanning forest (Prim 1957).

@@ -45,7 +45,7 @@ class CellWalk {
     }
     set_leave();
   }
-  /// False behind the line's end. Rounding may put that a little behind the grid's last wall.
+  /// False beyond the line's end, which rounding may place slightly outside of the grid.
   bool next() {
     enter = leave;
     if (enter >= line_.length) return false;
@@ -97,15 +97,15 @@ void append(const TricubicSurrogate& model, const Line& line, const CellWalk& wa
   }
 }
 
-/// Splits a run into clear steps, brackets and ambiguous. `before` and `after` are Φ's sign at the run's
-/// ends, or 0 where the line starts or stops there.
+/// Classifies a run's steps: without a zero, brackets, or ambiguous. `before` and `after` are Φ's sign at the
+/// run's ends, or 0 where the line starts or ends there.
 void classify(const Run& run, Index line, int before, int after, ScanResult& out, std::vector<Kind>& kinds) {
   const std::size_t steps = run.error.size();
   const auto slope = [&](std::size_t i) { return (run.p[i + 1] - run.p[i]) / (run.t[i + 1] - run.t[i]); };
   kinds.resize(steps);
   for (std::size_t i = 0; i < steps; ++i) {
     const double own = slope(i);
-    double bend = 0.0;  // how much the slope may vary within the step
+    double bend = 0.0;  // estimated variation of the slope within the step
     if (i > 0) bend = std::abs(own - slope(i - 1));
     if (i + 1 < steps) bend = std::max(bend, std::abs(slope(i + 1) - own));
     const double a = run.p[i], b = run.p[i + 1];

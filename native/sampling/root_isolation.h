@@ -7,7 +7,7 @@
 
 namespace arapfields {
 
-/// A part of a line in which Φ passes zero exactly once.
+/// A part of a line in which Φ has exactly one sign change.
 struct Bracket {
   Index line = 0;
   double low = 0.0, high = 0.0;  ///< parameters on the line
@@ -15,7 +15,7 @@ struct Bracket {
   double slope = 0.0;            ///< expected dΦ/dt there; its sign is that of Φ at `high`
 };
 
-/// A part of a line in which the model alone cannot count the zeros: Φ itself must be evaluated.
+/// A part of a line where the model's error bound leaves the number of zeros open: Φ must be evaluated.
 struct AmbiguousInterval {
   Index line = 0;
   double low = 0.0, high = 0.0;

@@ -9,8 +9,8 @@
 
 namespace arapfields {
 
-/// Bounding boxes of runs of four rows (n,width), of pairs of these, and so on up to all: tight where rows
-/// are in spatial order, and made in one pass where they move. In single precision.
+/// A binary hierarchy of bounding boxes over runs of four rows (n,width). Boxes are tight if rows are in
+/// spatial order; updates after a motion take one pass. In single precision.
 template <int width>
 class RowBoxes {
  public:
@@ -27,7 +27,7 @@ class RowBoxes {
     float gap(const Box& other) const {
       return (low - other.high).max(other.low - high).max(0.0f).square().sum();
     }
-    /// No inner product of a row in one and a row in the other is less.
+    /// Lower bound of the inner products of rows in both boxes.
     float least_product(const Box& other) const {
       const Row a = low * other.low, b = low * other.high, c = high * other.low, d = high * other.high;
       return a.min(b).min(c.min(d)).sum();
@@ -50,7 +50,7 @@ class RowBoxes {
     }
   }
   Index levels() const { return std::ssize(levels_); }
-  /// How many boxes a level has; runs are level 0.
+  /// Number of boxes of a level; runs are level 0.
   Index count(Index level = 0) const { return std::ssize(levels_[static_cast<std::size_t>(level)]); }
   const Box& box(Index level, Index k) const {
     return levels_[static_cast<std::size_t>(level)][static_cast<std::size_t>(k)];

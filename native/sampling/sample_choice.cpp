@@ -8,8 +8,8 @@
 namespace arapfields {
 namespace {
 
-/// How far from the chosen points others lie at most, in means of these distances. On one surface, chance
-/// leaves no such gaps.
+/// Largest distance to the nearest chosen point, in means of these distances: random choices on one surface
+/// leave no larger gaps.
 constexpr double widest_gap = 6.0;
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Choices of samples.
+// Selection of subsets of samples.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +10,14 @@
 
 namespace arapfields {
 
-/// `count` different numbers below n in random order (all of them where n is not larger).
+/// `count` distinct numbers below n in random order, or all if n is not larger.
 std::vector<Index> random_subset(Index n, Index count, Random& random);
 
-/// One random entry of each of `count` equal parts of the list: even coverage where the list is in spatial
-/// order.
+/// Stratified sampling: one random entry of each of `count` equal parts of the list, for even coverage if the
+/// list is in spatial order.
 std::vector<Index> stratified(const std::vector<std::uint32_t>& list, Index count, Random& random);
 
-/// The rows of points (n,3) that lie far from all of the chosen ones: of loose parts that were missed.
+/// The rows of points (n,3) that are far from all chosen ones: those of small parts without a chosen point.
 std::vector<Index> missed_rows(PointsIn points, const std::vector<Index>& chosen);
 
 Points rows_of(PointsIn points, const std::vector<Index>& rows);

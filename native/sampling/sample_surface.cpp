@@ -17,12 +17,12 @@ namespace {
 constexpr Index fewest_lines = 1024;
 constexpr Index most_lines_a_round = 1 << 18;
 constexpr Index hopeless_lines = 1 << 18;  // without a crossing: there is no surface
-// What a surface may take at most. Smooth ones take ten values a sample, noise of 0.001 a hundred.
+// Limits of the work. Smooth surfaces take ten values a sample, those with noise of 0.001 a hundred.
 constexpr Index most_lines_a_sample = 1 << 15, most_values = 1 << 20, most_values_a_sample = 1 << 10;
-// Sign changes to look at before fewer than one in a hundred with a zero are too few.
+// Sign changes after which less than one zero in least_share of them is an error: Φ jumps instead.
 constexpr Index fewest_sign_changes = 1000, least_share = 100;
 constexpr double least_slope = 1e-5;  // a distance's is 1; points are where |Φ| is below 2e-6
-constexpr double thickest = 0.1;  // of what a line meets where the function is 0, in cube units a crossing
+constexpr double thickest = 0.1;  // largest mean length of a line's parts with Φ = 0, cube units a crossing
 constexpr std::uint64_t shuffle_stream = ~std::uint64_t{0};
 
 /// The model pays off while it has fewer cells than a quarter of the points wanted.
@@ -59,7 +59,7 @@ class Caster {
     }
   }
   Index lines_cast() const { return cast_; }
-  /// Lines that should yield `crossings` more.
+  /// Expected number of lines for `crossings` more.
   Index lines_for(Index crossings) const {
     const double spacing = model_.spacing();
     // Before the first cast: the surface's area from the volume of the cells around it.
@@ -85,7 +85,7 @@ class Caster {
   throw InvalidInput("sdf", observed, "a function with a zero surface inside the cube [-1, 1]^3 is needed");
 }
 
-/// Throws where what was found so far is not the surface of a function, or too little of one.
+/// Throws InvalidInput if the crossings so far are not those of a surface, or too few.
 void require_surface(const Caster& caster, const EvaluationCounter& function, Index wanted) {
   const auto crossings = static_cast<Index>(caster.brackets.size());
   const Index cast = caster.lines_cast();
@@ -142,7 +142,7 @@ SurfaceSamples sample_surface(const ImplicitFunction& implicit, const SampleOpti
       caster.cast(caster.lines_for(missing - pool()));
       require_surface(caster, function, options.count);
     }
-    // Which crossings are kept must not depend on where they are.
+    // The choice of crossings must not depend on their positions.
     shuffle(caster.brackets, used, order);
     const auto begin = caster.brackets.begin() + static_cast<std::ptrdiff_t>(used);
     const std::vector<Bracket> chosen(begin, begin + missing);

@@ -5,11 +5,11 @@
 
 namespace arapfields {
 
-/// Winding numbers of a surface by samples of it as dipoles, of which those in a cell of a grid are one
-/// (Barill et al. 2018, Fast winding numbers for soups and clouds). Blurred within a cell of the surface.
+/// Winding numbers of a sampled surface, by one dipole for the samples in each cell of a grid (Barill et al.
+/// 2018, Fast winding numbers for soups and clouds). Smoothed within a cell's distance of the surface.
 class SampleWindings {
  public:
-  /// For places (n,3), their normals times the area that each stands for, and the edge of a cell.
+  /// For places (n,3), their normals (n,3) times area weights, and the edge of a cell.
   SampleWindings(PointsIn places, PointsIn normals, double edge);
   /// Positive inside, where the normals point outwards.
   double at(const Vec3& place) const;

@@ -11,17 +11,17 @@ namespace arapfields {
 namespace {
 
 constexpr Index grain = 256;
-/// Samples around a point are so many spacings away at most. Where that leaves fewer than these, they are so
-/// much farther than the nearest one.
+/// Radius, in spacings, of the samples around a point; if there are fewer than least_near, the radius is
+/// extended by the distance of the nearest one.
 constexpr double around = 2.0;
 constexpr Index least_near = 4;
-/// A way out of the surface has a greater cosine with the mean of the normals, which is short at rims.
+/// Outward directions have a larger cosine with the mean of the normals, which is short at rims.
 constexpr double inwards = -0.5;
-/// Steps towards the nearest point of a convex hull.
+/// Most iterations of Gilbert's method.
 constexpr int most_steps = 40;
 
-/// The way out of the convex hull of points p − arms (n,3) that leads past p, and how far beyond all of them
-/// p lies along it, by the method of Gilbert (1966). It ends where that is no more than `enough`.
+/// The direction from the convex hull of the points p − arms (n,3) to p, and the distance of p beyond them
+/// along it, by Gilbert's method (1966). It ends early if the distance is at most `enough`.
 std::pair<Vec3, double> out_of_hull(const Points& arms, double enough) {
   Index next = 0;
   arms.rowwise().squaredNorm().minCoeff(&next);
@@ -48,7 +48,7 @@ std::vector<Index> standing_out(PointsIn points, PointsIn samples, PointsIn norm
                                 double least, Index most, const Progress& progress) {
   const CancelScope scope(progress);
   const OrientedPoints tree(samples, Points::Zero(samples.rows(), 3));
-  Points ways(points.rows(), 3);  // out of the samples
+  Points ways(points.rows(), 3);  // directions out of the hulls
   Vector heights = Vector::Zero(points.rows()), reaches(points.rows());
   parallel_for(0, points.rows(), grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {

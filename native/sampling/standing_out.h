@@ -8,9 +8,9 @@
 
 namespace arapfields {
 
-/// Rows of points (p,3) of a surface that lie outside of the convex hull of the samples (n,3) around them by
-/// more than `least`, as tips and edges do. `normals` (n,3) are the samples'; what stands out inwards is left
-/// out. Of those that stand out together only the foremost, and `most` at most. `spacing` is about the
+/// Rows of points (p,3) of a surface that are farther than `least` outside of the convex hull of the samples
+/// (n,3) around them: tips and edges. `normals` (n,3) are the samples'; points on the inner side are left
+/// out. Of neighbouring ones only the farthest is taken, and at most `most` in all. `spacing` is the mean
 /// distance of neighbouring samples. Throws Cancelled.
 ARAPFIELDS_EXPORT_TO_TESTS std::vector<Index> standing_out(PointsIn points, PointsIn samples,
                                                            PointsIn normals, double spacing, double least,

@@ -10,9 +10,9 @@
 namespace arapfields {
 namespace {
 
-constexpr Index probes = 64;                            // points that decide on the step
+constexpr Index probes = 64;                            // points that determine the step
 constexpr double least_step = 4e-3, most_step = 0.128;  // in cube units; each is twice the one before
-// Cosines of 15 and 5 degrees. Half of a surface's creases or of a network's noise stays far below the first.
+// Cosines of 15 and 5 degrees: bounds on the median angle for gradients to be trusted and steps to agree.
 constexpr double trusted = 0.9659, settled = 0.9962;
 
 double median_cosine(const Points& a, const Points& b) {
@@ -24,7 +24,7 @@ double median_cosine(const Points& a, const Points& b) {
 
 }  // namespace
 
-/// Directions of central differences, which do not leave the cube.
+/// Unit vectors of central differences, at points clamped to the cube.
 Points SurfaceNormals::differences(const PointsF& points, double step) {
   const Index n = points.rows();
   PointsF shifted = points.replicate(6, 1);

@@ -5,14 +5,14 @@
 
 namespace arapfields {
 
-/// Unit normals at points of {Φ = 0}. Where ∇Φ does not agree with differences of Φ (noise, steps of a
-/// quantised distance), they come from differences over the least step that agrees with its double.
+/// Unit normals at points of {Φ = 0}. If ∇Φ does not agree with finite differences of Φ (noise, quantised
+/// distances), they are central differences with the smallest step that agrees with twice the step.
 class SurfaceNormals {
  public:
   explicit SurfaceNormals(EvaluationCounter& function) : function_(function) {}
 
-  /// (n,3), from ∇Φ at the points; a row of zeros where Φ is flat all around. The first points decide on the
-  /// step.
+  /// Normals (n,3), from ∇Φ at the points; a row of zeros where Φ is locally constant. The points of the
+  /// first call determine the step.
   Points operator()(const PointsF& points, const PointsF& gradients);
 
  private:
@@ -21,7 +21,7 @@ class SurfaceNormals {
 
   EvaluationCounter& function_;
   bool chosen_ = false;
-  double step_ = 0.0;  // 0: gradients serve
+  double step_ = 0.0;  // 0: gradients are used
 };
 
 }  // namespace arapfields

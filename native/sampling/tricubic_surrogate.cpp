@@ -51,7 +51,7 @@ TricubicSurrogate::TricubicSurrogate(EvaluationCounter& function, const Tricubic
     : lipschitz_(function.gradient_bound() ? *function.gradient_bound() : measure_lipschitz(function)) {
   for (int attempt = 0; attempt < max_rebuilds; ++attempt) {
     cull(function, options);
-    // No zero between the signs: where Φ is continuous, it is steeper there than its gradients tell.
+    // Both signs, but no active cell: a continuous Φ is steeper between them than its sampled gradients.
     const bool steeper = active_.empty() && coarse_slope_ > lipschitz_ && function.continuous();
     if (steeper) lipschitz_ = coarse_slope_;
     if (!steeper && (!options.interpolate || fill(function))) break;
@@ -113,8 +113,8 @@ float TricubicSurrogate::operator()(const Vec3& point) const {
                               static_cast<float>((point[2] + 1.0) * inverse - block_start(k)));
 }
 
-/// From coarse to fine: evaluates Φ at the centres of the cells that are left and keeps those whose value
-/// does not exclude a zero.
+/// From coarse to fine: evaluates Φ at the centres of the remaining cells and keeps those whose value does
+/// not exclude a zero.
 void TricubicSurrogate::cull(EvaluationCounter& function, const TricubicSurrogateOptions& options) {
   cells_a_side_ = options.coarsest;
   side_.assign(Index{cells_a_side_} * cells_a_side_ * cells_a_side_, 0);
@@ -161,8 +161,8 @@ void TricubicSurrogate::cull(EvaluationCounter& function, const TricubicSurrogat
   }
 }
 
-/// Evaluates Φ on the grid points that the active cells' blocks need. False, with the bound on |∇Φ| raised,
-/// where two neighbouring values differ by more than it allows.
+/// Evaluates Φ at the grid points of the active cells' blocks. False, with the bound on |∇Φ| raised, if two
+/// neighbouring values differ by more than it allows.
 bool TricubicSurrogate::fill(EvaluationCounter& function) {
   const Index points = cells_a_side_ + 1;
   const std::size_t total = points * points * points;
@@ -223,7 +223,7 @@ int TricubicSurrogate::settled_sign(Index cell, const Vec3& point) const {
   return result;
 }
 
-/// Each active cell gets the largest residual of its own and its 26 neighbours' centres, times the safety.
+/// Sets each active cell's error: error_safety times the largest residual at its and 26 neighbours' centres.
 void TricubicSurrogate::measure_errors() {
   const auto count = static_cast<Index>(active_.size());
   error_.assign(side_.size(), 0.0f);

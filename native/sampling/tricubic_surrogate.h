@@ -11,17 +11,17 @@
 namespace arapfields {
 
 struct TricubicSurrogateOptions {
-  Index target_cells = 5000;   ///< halve the cells until so many may hold the surface …
-  int max_cells_a_side = 128;  ///< … or the cube would have more than so many of them a side
-  int coarsest = 16;           ///< cells a side to begin with
-  bool interpolate = true;     ///< else the cells' sides alone are known, and p and its errors are not
+  Index target_cells = 5000;   ///< cells are halved until so many may contain the surface …
+  int max_cells_a_side = 128;  ///< … or the cube would have more than so many cells a side
+  int coarsest = 16;           ///< cells a side at the start
+  bool interpolate = true;     ///< false: only the signs of cells are computed, not p and its errors
 };
 
-/// A cheap stand-in for Φ near {Φ = 0}. The cube is cut into resolution³ cells, from coarse to fine; a cell
-/// is dropped where |Φ(centre)| exceeds a bound on |∇Φ| times its half diagonal, for then Φ keeps
-/// its sign there. In the cells that remain, cubic interpolation p of Φ on their corners and the corners
-/// around them replaces Φ, with an error bound measured by Φ − p at cell centres. Sampling and extraction use
-/// p to find where Φ itself must be evaluated.
+/// A cheap surrogate p of Φ near {Φ = 0}. The cube is divided into resolution³ cells, from coarse to fine; a
+/// cell is culled if |Φ(centre)| exceeds a bound on |∇Φ| times its half diagonal, since Φ then has one sign
+/// there. In the remaining cells p is the tricubic interpolant of Φ at their corners and the corners around
+/// them, with an error bound measured by Φ − p at cell centres. Sampling and extraction use p to find where Φ
+/// itself must be evaluated.
 class TricubicSurrogate {
  public:
   TricubicSurrogate(EvaluationCounter& function, const TricubicSurrogateOptions& options);
@@ -32,7 +32,7 @@ class TricubicSurrogate {
   /// Bound on |∇Φ| in use: Φ's own, else measured, and raised until no difference of grid values contradicts
   /// it.
   double lipschitz() const { return lipschitz_; }
-  /// Cells that may hold the surface, ascending; their bounding box (meaningless for none).
+  /// Cells that may contain the surface, ascending; their bounding box (undefined for none).
   const std::vector<Index>& active() const { return active_; }
   /// Whether Φ has both signs in other cells.
   bool has_both_sides() const;
@@ -52,7 +52,8 @@ class TricubicSurrogate {
   /// The latter from the former.
   float slope_error_of(float error) const;
 
-  /// The sign that Φ at an active cell's centre and corners leaves a point in it, or 0 where both are left.
+  /// The sign of Φ at a point of an active cell, as far as Φ at its centre and corners and the bound on |∇Φ|
+  /// determine it; 0: either.
   int settled_sign(Index cell, const Vec3& point) const;
 
   /// p's coefficients in an active cell; at(block, …) evaluates them at a point of the cube.
@@ -75,7 +76,7 @@ class TricubicSurrogate {
   VectorF centre_values_;      // of active_
   std::vector<float> centre_;  // the same, resolution³
   std::vector<float> error_;   // resolution³
-  std::vector<float> values_;  // (resolution+1)³ grid points, NaN where not needed
+  std::vector<float> values_;  // (resolution+1)³ grid points; NaN: not computed
 };
 
 }  // namespace arapfields

@@ -7,9 +7,9 @@
 namespace arapfields {
 namespace {
 
-/// A bone matters where it is at most so many times as far as the nearest, through the inside.
+/// Candidate bones are nearer than this multiple of the nearest bone's interior distance.
 constexpr float farthest_share = 12.0f;
-/// Of the distances of bones, in squared sizes of the shape.
+/// Weight of the penalties, in squared sizes of the shape.
 constexpr double distance_weight = 2e-6;
 
 }  // namespace

@@ -9,29 +9,29 @@
 
 namespace arapfields {
 
-/// Which bones may move a point of the shape at rest that is near a node, and how much each is disfavoured
-/// for being far, from the lengths (bones) of the ways to them through the inside.
+/// The candidate bones of a point near a node, and their linear penalties in the fit of weights, which grow
+/// with the interior distances (bones) of the node.
 class BoneChoice {
  public:
-  /// Bones of the other side than this one count by this share.
+  /// Bones on the opposite side of `side` (±1; 0: none) have a reduced influence, `share` in [0, 1].
   BoneChoice(const RigShape& rig, Index node,
              const Eigen::Ref<const Eigen::Matrix<float, 1, Eigen::Dynamic>>& distances, int side,
              double share);
 
   Index count() const { return static_cast<Index>(bones.size()); }
-  /// wᵀ G w is the squared distance in sizes of the shape, for weights of sum one, of a point from where a
-  /// pose has it.
+  /// The Gram matrix G (count, count) of the bones' errors: for weights of sum one, wᵀ G w is the squared
+  /// distance, in sizes of the shape, of the skinned point from its position `there` in a pose.
   BonePairs square(const Vec3& rest, const std::vector<Mat4>& motions, const Vec3& there,
                    double extent) const;
 
-  /// The squares as they are minimised: the effect of bones of the other side costs more the less they count.
+  /// G with the block of the opposite side's bones divided by `share`, which reduces their weights.
   BonePairs held_back(const BonePairs& squares) const;
 
-  std::vector<Index> bones;  ///< the nearest first
+  std::vector<Index> bones;  ///< in ascending order of distance
   FewBones penalties;
 
  private:
-  std::vector<Index> others_;  // of the bones, those of the other side
+  std::vector<Index> others_;  // positions in `bones` of those on the opposite side
   double share_;
 };
 

@@ -12,8 +12,8 @@ namespace arapfields {
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
-/// A bone matters within so many steps, and where the bones between are at most so long, next to its
-/// distance.
+/// A bone may influence another's region within so many steps, or if the bones between them have at most this
+/// length, relative to the distance.
 constexpr int most_steps = 2;
 constexpr double most_between = 0.5;
 
@@ -38,7 +38,7 @@ RowMatrix<float> BoneRegions::distances(const InteriorGraph& graph) const {
     std::vector<float> start(owner.size(), infinity);
     for (Index i = 0; i < graph.size(); ++i)
       if (owner[i] == b) start[i] = straight(i, b);
-    if (std::ranges::find(owner, b) == owner.end()) {  // it lies in others' parts
+    if (std::ranges::find(owner, b) == owner.end()) {  // a bone that owns no node starts at the nearest
       Index nearest = 0;
       straight.col(b).minCoeff(&nearest);
       start[nearest] = straight(nearest, b);
@@ -60,7 +60,7 @@ BoneTree::BoneTree(const Skeleton& skeleton)
       joined[parent].push_back(b);
     }
   for (Index from = 0; from < n; ++from) {
-    std::vector<std::pair<Index, Index>> open{{from, -1}};  // bones, and where each was reached from
+    std::vector<std::pair<Index, Index>> open{{from, -1}};  // bones and their predecessors
     for (std::size_t k = 0; k < open.size(); ++k) {
       const auto [b, before] = open[k];
       const Bone& bone = skeleton.bone(b);

@@ -9,32 +9,32 @@
 
 namespace arapfields {
 
-/// Which bone each node of a shape belongs to. A surface with bones in it belongs to these, each node to the
-/// one that is nearest through the inside; others belong to what they touch.
+/// The owner bone of each node of a shape. Nodes of a surface that contains bones belong to the one of these
+/// with the smallest interior distance; nodes of other surfaces belong to the owners of what they touch.
 struct BoneRegions {
   /// The nodes are these samples, about `spacing` apart, and the graph's.
   BoneRegions(const Skeleton& skeleton, const PiecePoints& surfaces, const std::vector<Index>& nodes,
               double spacing, const InteriorGraph& graph);
 
-  /// Lengths (n, bones) of the shortest ways to each bone.
+  /// Interior distances (n, bones) to each bone, by shortest paths in the graph.
   RowMatrix<float> distances(const InteriorGraph& graph) const;
 
-  std::vector<Index> owner;      ///< (n) the bone
-  std::vector<Index> own_bones;  ///< of each surface: how many lie in it
-  RowMatrix<float> straight;     ///< (n, bones) straight distances
+  std::vector<Index> owner;      ///< (n) bone of each node
+  std::vector<Index> own_bones;  ///< number of bones in each surface
+  RowMatrix<float> straight;     ///< (n, bones) Euclidean distances
 };
 
-/// How far bones are from each other along the skeleton.
+/// Distances between bones along the skeleton's tree.
 class BoneTree {
  public:
   explicit BoneTree(const Skeleton& skeleton);
 
-  /// Whether a bone can matter to what belongs to another, at this distance from it.
+  /// Whether a bone may influence points of the owner's region, at this distance from the bone.
   bool matters(Index bone, Index owner, double distance) const;
 
  private:
-  Eigen::MatrixXi steps_;    // (bones, bones) from one to the other
-  Eigen::MatrixXd between_;  // (bones, bones) length of the bones between
+  Eigen::MatrixXi steps_;    // (bones, bones) edges of the path between two bones
+  Eigen::MatrixXd between_;  // (bones, bones) total length of the bones on it
 };
 
 }  // namespace arapfields

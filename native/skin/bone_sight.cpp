@@ -8,10 +8,10 @@
 namespace arapfields {
 namespace {
 
-/// What is so much farther than the nearest in a direction is hidden.
+/// A point is occluded if it is farther than this multiple of the depth in its direction.
 constexpr double hidden = 1.2;
 
-/// The cell of a cube around the origin, each of its faces divided into count × count, in a direction.
+/// The cell of a cube map, with count × count cells a face, in a direction.
 std::size_t cell_of(const Vec3& way, int count) {
   int axis = 0;
   const double most = way.cwiseAbs().maxCoeff(&axis);

@@ -9,20 +9,20 @@
 
 namespace arapfields {
 
-/// What is seen of surfaces from a place: how far away they are in each direction.
+/// The visibility of surfaces from a place, by cube maps: a depth buffer and the covered directions of each.
 class BoneSight {
-  static constexpr int wide = 2;  // cells of a cube's edge
-  static constexpr int fine = 6;
+  static constexpr int wide = 2;  // cells along an edge of the coarse cube map
+  static constexpr int fine = 6;  // of the depth buffer
 
  public:
   static constexpr int all_sides = 6 * wide * wide;
 
-  /// Of the points those whose surface has one of `count` slots, by the number of the surface; −1: none.
+  /// Renders the points whose surface has one of `count` slots; `slots` maps surfaces to slots, −1: none.
   BoneSight(const PiecePoints& surfaces, const std::vector<Index>& slots, Index count, const Vec3& place);
 
-  /// On how many sides of the place a surface lies.
+  /// Number of coarse cells (directions) that a surface covers.
   int sides(Index slot) const { return static_cast<int>(sides_[static_cast<std::size_t>(slot)].count()); }
-  /// Whether nothing of a point's own surface hides it; `tolerance` is a length.
+  /// Whether a point is not occluded by its own surface; `tolerance` is a length.
   bool sees(const Vec3& point, Index slot, double tolerance) const;
 
  private:

@@ -16,20 +16,20 @@ namespace arapfields {
 namespace {
 
 constexpr std::uint64_t stream = 35;
-/// A regression needs so many poses a feature; more than the most add little.
+/// Example poses for each feature of the regression, and bounds of their number.
 constexpr Index poses_per_feature = 4, least_poses = 36, most_poses = 288;
-/// A bone moves a vertex from this weight on.
+/// Skin weight above which a bone moves a vertex.
 constexpr float least_weight = 1e-3f;
-/// Bones so many steps in the tree from those that move a vertex matter to it too.
+/// A vertex depends on bones within so many steps in the tree of those that move it.
 constexpr int joint_steps = 2;
-/// Ridge of the regressions, as a share of the features' mean square.
+/// Ridge of the regressions, as a fraction of the features' mean square.
 constexpr double ridge = 0.03;
-/// Most vertices of a region, so that threads share them out.
+/// Most vertices of a region, which is a unit of parallel work.
 constexpr std::size_t region_size = 512;
 /// The entries of a symmetric matrix (3,3) in the order of the features.
 constexpr std::array<std::pair<int, int>, 6> entries{{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
 
-/// What a turn of the joint's axes does to its features.
+/// The linear map (9,9) of a joint's features under a rotation of its axes.
 FeaturePairs turned(const Mat3& turn) {
   FeaturePairs result = FeaturePairs::Zero(joint_features, joint_features);
   result.topLeftCorner<3, 3>() = turn;
@@ -156,7 +156,7 @@ void CorrectiveFit::find_regions(const Skeleton& skeleton, const RowMatrix<float
   }
 }
 
-/// Features times offsets over the poses; a twin's, reflected, are those in the mirrored ones.
+/// Features times residuals over the poses; those of mirrored poses are the twin vertex's, reflected.
 Eigen::MatrixXd CorrectiveFit::right(const Region& region, Index vertex) const {
   Eigen::MatrixXd result = right_[vertex].cast<double>();
   if (!region.mirrored) return result;

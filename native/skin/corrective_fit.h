@@ -17,7 +17,7 @@ using FeaturePairs = Eigen::MatrixXd;  ///< (9,9)
 
 JointFeatures joint_features_of(const Mat3& rotation);
 
-/// A rig's symmetry as poses and keys see it. Without one, nothing is mirrored.
+/// The reflection of poses and shape keys by a rig's symmetry. Without one, nothing is mirrored.
 struct Reflection {
   Reflection(const RigShape& rig, PointsIn points);
 
@@ -33,27 +33,28 @@ struct Reflection {
   std::vector<FeaturePairs> maps;  ///< features of a joint → its twin's in the mirrored pose
 };
 
-/// Ridge regression of what is left between skin and field on the joints' features, over example poses. Each
-/// vertex has the joints near it alone.
+/// Ridge regression of the residuals between skin and field, taken back to rest, on the joints' features over
+/// example poses. A vertex depends on nearby joints alone.
 class CorrectiveFit {
  public:
-  /// Vertices (n,3) that the same joints matter to.
+  /// Vertices that depend on the same joints.
   struct Region {
     std::vector<Index> joints;
     std::vector<Index> vertices;
-    bool mirrored;  ///< mirrored poses count too
+    bool mirrored;  ///< whether mirrored poses enter the regression too
   };
 
   /// Vertices (n,3) near these nodes, weights (n, bones); throws Cancelled.
   CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::vector<Index>& nodes,
                 const RowMatrix<float>& weights, const SkinOptions& options, const Progress& progress);
 
-  /// (columns, 3 · vertices of the region, step by step) on polynomials (the region's features, columns).
+  /// Regression coefficients (columns, 3 · vertices) of every step-th vertex of a region, on polynomials
+  /// (the region's features, columns).
   Eigen::MatrixXd slopes(const Region& region, const Eigen::MatrixXd& polynomials, Index step = 1) const;
 
   Reflection reflection;
   std::vector<Region> regions;
-  Eigen::MatrixXd values;  ///< features (poses, joints · 9); mirrored poses follow
+  Eigen::MatrixXd values;  ///< features (poses, joints · 9), then those of the mirrored poses
 
  private:
   void find_regions(const Skeleton& skeleton, const RowMatrix<float>& weights);

@@ -12,17 +12,17 @@
 namespace arapfields {
 namespace {
 
-/// Vertices by which keys are chosen.
+/// Most vertices by which keys are chosen.
 constexpr Index most_seen = 8000;
 
-/// A polynomial of one joint's rotation, and how much of what is left it takes.
+/// A polynomial of one joint's rotation, and its reduction of the squared residual.
 struct Key {
   double gain;
   Index joint;
   JointFeatures coefficients;
 };
 
-/// The keys of most effect, at most so many; those of twins come together.
+/// The keys of largest gain, at most `most`; those of twin bones are chosen together.
 std::vector<Key> chosen_keys(const Skeleton& skeleton, const CorrectiveFit& fit,
                              const std::vector<FeaturePairs>& effect, int most) {
   const Reflection& reflection = fit.reflection;
@@ -60,7 +60,7 @@ std::vector<Key> chosen_keys(const Skeleton& skeleton, const CorrectiveFit& fit,
   return result;
 }
 
-/// All features of all joints: how much of what is left each joint's directions take.
+/// For each joint the quadratic form (9,9) of how much a polynomial of it reduces the squared residual.
 std::vector<FeaturePairs> effects_of(const RigShape& rig, const CorrectiveFit& fit,
                                      const Progress& progress) {
   std::vector<std::vector<FeaturePairs>> parts(fit.regions.size());
@@ -116,7 +116,7 @@ std::vector<Corrective> skin_correctives(const TriangleMesh& mesh, const std::ve
     Eigen::Map<JointFeatures>(result[k].coefficients.data()) = keys[k].coefficients;
     result[k].offsets = Points::Zero(n, 3);
   }
-  // The keys' offsets together.
+  // Offsets of all keys, by one regression for each region.
   parallel_jobs(static_cast<Index>(fit.regions.size()), [&](Index r) {
     const CorrectiveFit::Region& region = fit.regions[r];
     const auto near = static_cast<Index>(region.joints.size());

@@ -12,20 +12,20 @@
 
 namespace arapfields {
 
-/// A shape key that takes the skin to the field's poses, driven by one joint. Its value is a polynomial of
-/// the joint's rotation in the bone's axes, the unit quaternion (w, x, y, z): Σ coefficients · (wx, wy, wz,
-/// xx, yy, zz, xy, xz, yz), cut to −1 … 1. It is the same for a quaternion and its negative, and 0 at rest.
+/// A corrective shape key that brings the skin closer to the field, driven by one joint. Its value is a
+/// polynomial of the joint's rotation in the bone's axes, the unit quaternion (w, x, y, z): Σ coefficients ·
+/// (wx, wy, wz, xx, yy, zz, xy, xz, yz), clamped to [−1, 1]. It is equal for q and −q, and 0 at rest.
 struct ARAPFIELDS_EXPORT Corrective {
   Index bone;                          ///< among all bones
-  std::array<double, 9> coefficients;  ///< such that 1 is the largest value in the poses seen
+  std::array<double, 9> coefficients;  ///< scaled so that 1 is the largest absolute value over the poses
   Points offsets;                      ///< (n,3) of the vertices at rest
 
   double value(const Mat3& rotation) const;
 };
 
-/// At most options.correctives shape keys for weights (n, bones), those first that take most of what is left
-/// between the skin and the field. On a symmetric rig twin bones have mirrored keys, and the other keys are
-/// even or odd. Throws InvalidInput as skin_weights does; Cancelled.
+/// At most options.correctives shape keys for weights (n, bones), in descending order of how much they reduce
+/// the squared residual between skin and field. On a symmetric rig twin bones have mirrored keys, and the
+/// other keys are even or odd. Throws InvalidInput as skin_weights does; Cancelled.
 ARAPFIELDS_EXPORT std::vector<Corrective> skin_correctives(
     const TriangleMesh& mesh, const std::vector<Bone>& bones, const RowMatrix<float>& weights,
     const SkinOptions& options, const Progress& progress = {}, const VertexWeights& painted = {});

@@ -28,7 +28,7 @@ Mat3 random_rotation(const Bone& bone, Random& random) {
   return angle > 0.0 ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() : Mat3::Identity();
 }
 
-/// With surfaces that cut each other, parts that other bones move are far from each other; else the solver's.
+/// For intersecting surfaces, a rest shape whose interior paths do not join unrelated bones; else null.
 std::shared_ptr<const RestShape> rest_shape(const RigShape& rig, std::uint64_t seed,
                                             const Progress& progress) {
   if (!rig.cuts_itself()) return nullptr;
@@ -57,7 +57,8 @@ ExamplePose ExamplePoses::draw(Random& random, const Vector& activity, const Pro
   ExamplePose pose;
   for (Index b = 0; b < rig_.skeleton.count(); ++b) {
     const Bone& bone = rig_.skeleton.bone(b);
-    const Mat3 rotation = random_rotation(bone, random);  // drawn for each, so that poses stay comparable
+    const Mat3 rotation =
+        random_rotation(bone, random);  // always drawn: the stream is independent of activity
     const bool turns = bone.parent >= 0 && random.uniform() < activity[b];
     pose.rotations.push_back(turns ? rotation : Mat3::Identity());
   }

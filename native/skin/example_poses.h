@@ -11,23 +11,24 @@
 
 namespace arapfields {
 
-/// A rig's pose and the shape that the field gives it.
+/// A pose of a rig and the shape under the field.
 struct ExamplePose {
   std::vector<Mat3> rotations;  ///< of the deforming bones, in their own axes
-  std::vector<Mat4> motions;
-  PointsF shape;  ///< (n,3)
+  std::vector<Mat4> motions;    ///< of the deforming bones, from rest
+  PointsF shape;                ///< (n,3)
 };
 
-/// Poses a shape by its bones as handles.
+/// Generates example poses of a shape, with its bones as the field's handles.
 class ExamplePoses {
  public:
   /// The field moves these points (n,3).
   ExamplePoses(const RigShape& rig, PointsIn points, const SkinOptions& options, const Progress& progress);
 
-  /// From now on what bones hold goes with them, of points near these nodes (n).
+  /// From now on points that RigShape::holder() assigns to a bone move rigidly with it; `near` (n) are the
+  /// points' nearest nodes.
   void hold(const std::vector<Index>& near);
 
-  /// A pose in which each joint turns with this probability (joints), within its limits.
+  /// A random pose: each joint rotates within its limits, with the probability `activity` (joints).
   ExamplePose draw(Random& random, const Vector& activity, const Progress& progress);
 
  private:

@@ -9,26 +9,27 @@ namespace arapfields {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-/// In sizes of the shape: over this length from where limbs part, bones of the other side lose their effect.
+/// Length, in sizes of the shape, over which the opposite side's influence vanishes where limbs separate.
 constexpr double fade = 0.04;
-/// What would count by less does not count.
+/// Smaller influences are set to 0.
 constexpr double least_share = 0.01;
-/// The same for the depth of a gap between limbs that do not part.
+/// Depth of a gap, in sizes of the shape, over which the influence falls to 0.
 constexpr double gap_fade = 0.006;
-/// A sheet that runs on across the plane turns less than this.
+/// Cosine of normals above which a point and the surface at the symmetry plane are one continuous sheet.
 constexpr double sheet_cosine = 0.7;
-/// How much farther a bone straight outside of the surface counts than one inside.
+/// Factor on the part of a bone's distance along the outward normal, against bones outside of the surface.
 constexpr double outside = 3.0;
-/// Where a surface at the plane faces a limb's end with at least this cosine, the limb parts from its twin.
+/// Least cosine of the normal at the symmetry plane with a limb's direction where it and its twin separate.
 constexpr double facing_end = 0.5;
 
-/// The bones of one side that hang on one another.
+/// A chain or tree of bones on one side.
 struct Limb {
-  Vec3 along = Vec3::Zero();   ///< unit vector within the plane of symmetry, to the farthest end
-  double parting = -infinity;  ///< how far along it the limb and its twin still meet; −infinity: nowhere
+  Vec3 along = Vec3::Zero();  ///< unit vector within the symmetry plane, towards the farthest end
+  double parting =
+      -infinity;  ///< coordinate along it where the limb separates from its twin; −infinity: none
 };
 
-/// The first bone of each bone's limb.
+/// The root bone of each bone's limb.
 std::vector<Index> roots_of(const RigShape& rig) {
   std::vector<Index> roots;
   for (Index b = 0; b < rig.skeleton.count(); ++b) {
@@ -39,7 +40,7 @@ std::vector<Index> roots_of(const RigShape& rig) {
   return roots;
 }
 
-/// The nearest bone to a place on the surface, on whose outer side bones count as farther.
+/// The bone nearest to a place on the surface, by a distance that penalises bones on its outer side.
 Index nearest_bone(const Skeleton& skeleton, const Vec3& place, const Vec3& normal) {
   double least = infinity;
   Index result = 0;
@@ -51,7 +52,7 @@ Index nearest_bone(const Skeleton& skeleton, const Vec3& place, const Vec3& norm
   return result;
 }
 
-/// By the first bone; the surface has outward normals.
+/// The limbs, indexed by root bone.
 std::vector<Limb> limbs_of(const RigShape& rig, const std::vector<Index>& roots, PointsIn surface) {
   std::vector<Limb> limbs(roots.size());
   for (std::size_t b = 0; b < roots.size(); ++b) {
@@ -93,7 +94,7 @@ LimbSides::LimbSides(const RigShape& rig, const PiecePoints& given, const std::v
   middle.col(axis).setConstant(rig.symmetry.offset);
   const std::vector<Index> nearest = rig.nearest_samples(between);
   for (Index i = 0; i < points.rows(); ++i) {
-    // Parts that touch may cross the plane.
+    // Parts that touch may lie across the plane: the owner's side counts.
     if (const int own_side = rig.sides[rig.owners[near[i]]]; rig.cuts_itself() && own_side != 0) {
       sides[i] = own_side;
       shares[i] = 0.0;
@@ -104,7 +105,7 @@ LimbSides::LimbSides(const RigShape& rig, const PiecePoints& given, const std::v
     for (Index b = 0; b < rig.skeleton.count(); ++b)
       if (rig.sides[b] * beyond > 0.0 && (own < 0 || distances(i, b) < distances(i, own))) own = b;
     if (own < 0) continue;
-    // How far the point's place between the sides lies outside of the shape.
+    // Depth of the gap: distance of the point's projection onto the symmetry plane outside of the shape.
     const Vec3 normal = rig.samples.normals.row(nearest[i]);
     const double gap = normal.dot(Vec3(middle.row(i) - surface.row(nearest[i])));
     const double closed = 1.0 - gap / (gap_fade * rig.extent);

@@ -7,16 +7,17 @@
 
 namespace arapfields {
 
-/// A leg does not move the other. How much bones of the other side may move points (n,3): wholly where the
-/// limbs are joined; less and less along a limb from the place where it parts from its twin, then not at all,
-/// and not across a gap that the points face. Where parts touch, each goes by the bone that it belongs to.
+/// How much bones on the opposite side of a symmetric rig may move points (n,3), so that one leg does not
+/// move the other: fully where the limbs are joined, falling to zero along a limb beyond the place where it
+/// separates from its twin, and not across a gap that the points face. If parts of the shape touch, a point's
+/// side is that of its owner bone.
 struct LimbSides {
-  /// `near` are the nodes that the points are nearest to; distances (n, bones), in units of the points.
+  /// `near` (n) are the points' nearest nodes; interior distances (n, bones), in the points' units.
   LimbSides(const RigShape& rig, const PiecePoints& given, const std::vector<Index>& near,
             const RowMatrix<float>& distances);
 
-  std::vector<int> sides;      ///< (n) of each point: −1 and 1; 0 where all bones count
-  std::vector<double> shares;  ///< (n) from 0 to 1
+  std::vector<int> sides;      ///< (n) side of each point, −1 or 1; 0: all bones have full influence
+  std::vector<double> shares;  ///< (n) influence of the opposite side's bones, 0 to 1
 };
 
 }  // namespace arapfields

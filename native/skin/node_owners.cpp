@@ -17,28 +17,28 @@ namespace arapfields {
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
-/// Places along a bone from which nodes are seen.
+/// Bounds of the number of view points along a bone.
 constexpr Index least_places = 5, most_places = 40;
-/// A place is inside a surface that lies on so many sides of it; a bone that is inside none may be in one
-/// that lies on fewer.
+/// A view point is inside a surface that covers at least `enough_sides` of the 24 directions; a bone inside
+/// none may be in one that covers at least `least_sides`.
 constexpr int enough_sides = 21, least_sides = 14;
-/// A surface with fewer samples cannot be seen to lie around a bone.
+/// Surfaces with fewer samples cannot enclose a bone.
 constexpr Index least_samples = BoneSight::all_sides;
-/// A bone is in a surface with so much of its length.
+/// Least fraction of a bone's view points inside a surface for the bone to be in it.
 constexpr double share_inside = 0.4;
-/// A joint is the middle of a surface with so many samples, the farthest at most so many times as far as the
-/// nearest, and their mean at most at such a share of its distance.
+/// A joint is the centre of a surface with at least so many samples, if the ratio of their largest and
+/// smallest distance, and that of the distance of their mean, are at most these.
 constexpr Index least_around = 4;
 constexpr double farthest_around = 1.5, mean_around = 0.6;
-/// On so many sides a ring lies around a bone, on the nearest with at least such a share of the farthest
-/// distance.
+/// A ring covers all of so many sectors around a bone; the ratio of the smallest and the largest distance is
+/// at least ring_share.
 constexpr std::size_t ring_sides = 8;
 constexpr double ring_share = 0.25;
-/// A surface touches what is so many spacings farther than the nearest.
+/// A surface touches nodes that are at most so many spacings farther than the nearest one.
 constexpr double touching_spacings = 0.5;
 
-/// On how many sides a surface must lie around a place of a bone for the bone to be in it there. Bones that
-/// are in none are in the one that lies most around them.
+/// For each slot the number of directions that its surface must cover at a view point for a bone to be in it
+/// there. A bone in no surface is in the one that covers the most directions.
 std::vector<int> sides_needed(const std::vector<BoneSight>& places, Index slots) {
   std::vector<int> result(slots, BoneSight::all_sides + 1);
   int most = 0;
@@ -60,7 +60,7 @@ std::vector<int> sides_needed(const std::vector<BoneSight>& places, Index slots)
   return result;
 }
 
-/// Where a bone is looked at, in shares of its length.
+/// The view points along a bone, as fractions of its length.
 std::vector<double> shares_along(double length, double spacing) {
   const Index count = std::clamp(static_cast<Index>(std::ceil(length / spacing)), least_places, most_places);
   std::vector<double> shares;
@@ -108,7 +108,7 @@ std::vector<Index> NodeOwners::own_bones() const {
   return result;
 }
 
-/// Straight ways from each bone to the nodes that it sees of the surfaces in which it lies.
+/// Initial paths: straight ones from each bone to the visible nodes of the surfaces that contain it.
 void NodeOwners::see(const Skeleton& skeleton) {
   std::vector<std::vector<Length>> ways(skeleton.count());
   parallel_jobs(skeleton.count(), [&](Index b) {
@@ -140,7 +140,7 @@ void NodeOwners::see(const Skeleton& skeleton) {
     for (std::size_t i = 0; i < nodes_.size(); ++i) best_[i] = std::min(best_[i], each[i]);
 }
 
-/// The surface of which a joint is the middle, as of an eye; −1 for none.
+/// The surface whose centre is a joint, such as an eyeball; −1: none.
 Index NodeOwners::surface_around(const Vec3& joint) const {
   std::vector<double> least(slots_.size(), std::numeric_limits<double>::infinity()), most(slots_.size(), 0.0);
   std::vector<Vec3> sums(slots_.size(), Vec3::Zero());
@@ -162,8 +162,8 @@ Index NodeOwners::surface_around(const Vec3& joint) const {
   return result;
 }
 
-/// A bone that lies in no surface takes the nearest one where no bone lies; others may join it there. Where
-/// all are so, each node belongs to the nearest bone.
+/// A bone in no surface takes the nearest surface without bones, which it may share with others. If no bone
+/// is in a surface, each node belongs to the nearest bone.
 void NodeOwners::take_free_surfaces() {
   std::vector<bool> has_surface(straight_.cols(), false);
   for (const Length& each : best_)
@@ -181,7 +181,7 @@ void NodeOwners::take_free_surfaces() {
   for (std::size_t i = 0; i < nodes_.size(); ++i) best_[i] = std::min(best_[i], taken[i]);
 }
 
-/// Nodes take the bone to which the way on their own surface is shortest.
+/// Extends the paths to all nodes of the same surface by Dijkstra's algorithm.
 void NodeOwners::spread() {
   using Entry = std::pair<Length, std::size_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
@@ -200,7 +200,7 @@ void NodeOwners::spread() {
   }
 }
 
-/// Nodes of a surface with bones that no way reaches belong with the nearest there.
+/// Nodes without a path take the owner of the nearest node of the same surface that has one.
 void NodeOwners::fill() {
   std::map<Index, Nodes> reached;
   for (std::size_t i = 0; i < best_.size(); ++i)
@@ -213,7 +213,7 @@ void NodeOwners::fill() {
   }
 }
 
-/// Whether nodes lie around a bone as a ring does.
+/// Whether nodes form a ring around a bone.
 bool NodeOwners::lies_about(const Nodes& nodes, const Bone& bone) const {
   const Mat3 axes = bone_axes(bone);
   const double length = (bone.tail - bone.head).norm();
@@ -234,8 +234,8 @@ bool NodeOwners::lies_about(const Nodes& nodes, const Bone& bone) const {
   return false;
 }
 
-/// Where a surface without bones touches others, its nodes belong with what they touch, of the same side
-/// above all, and of bones next to the nearest of these. A ring belongs with the bones inside it.
+/// Nodes of a surface without bones take the owners of the nodes that they touch, preferably with similar
+/// normals, and of bones adjacent to the nearest one. A ring belongs to the bones inside it.
 void NodeOwners::touch(const Skeleton& skeleton) {
   std::map<Index, Nodes> without;
   for (std::size_t i = 0; i < best_.size(); ++i)
@@ -253,8 +253,7 @@ void NodeOwners::touch(const Skeleton& skeleton) {
   }
 }
 
-/// Nodes that have bones: those that lie in no other surface, or all if none does; and all of them, these
-/// last.
+/// Nodes with owners: those outside of all other surfaces (all, if there are none), and all of them.
 std::pair<NodeOwners::Nodes, NodeOwners::Nodes> NodeOwners::nodes_with_bones() const {
   std::vector<char> hidden(best_.size(), 0);
   parallel_for(0, graph_.size(), 16, [&](Index first, Index last) {
@@ -267,10 +266,10 @@ std::pair<NodeOwners::Nodes, NodeOwners::Nodes> NodeOwners::nodes_with_bones() c
   return {seen.empty() ? all : seen, all};
 }
 
-/// Nodes of a surface without bones belong with the nearest of the others where these are near enough, but
-/// not with bones that cannot matter beside the one that is nearest to the whole.
+/// Nodes of a surface without bones take the owners of the nearest of `others` where these touch it, but only
+/// bones that may influence the region of the bone nearest to the whole surface.
 void NodeOwners::join(const Nodes& own, const Nodes& others, const BoneTree& tree) {
-  const auto turned = [&](std::size_t i, std::size_t j) {  // in squares of the spacing
+  const auto turned = [&](std::size_t i, std::size_t j) {  // squared difference of normals times spacing²
     const auto& normals = surfaces_.normals;
     return spacing_ * spacing_ * (normals.row(nodes_[i]) - normals.row(nodes_[j])).squaredNorm();
   };

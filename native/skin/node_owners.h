@@ -9,22 +9,21 @@
 
 namespace arapfields {
 
-/// Finds which bone each node of a shape belongs to, of samples on surfaces that may cut each other. What is
-/// given has to outlive it.
+/// Finds the owner bone of each node of a shape whose surfaces may intersect. Borrows its arguments.
 class NodeOwners {
  public:
-  /// The nodes are these samples, about `spacing` apart, and the graph's; `straight` are distances (n,
-  /// bones).
+  /// The nodes, which are the graph's, are these rows of the samples, about `spacing` apart; `straight`
+  /// (n, bones) are Euclidean distances.
   NodeOwners(const PiecePoints& surfaces, const std::vector<Index>& nodes, double spacing,
              const InteriorGraph& graph, const RowMatrix<float>& straight);
 
-  /// Bones (n).
+  /// The owner (n) of each node.
   std::vector<Index> found(const Skeleton& skeleton);
-  /// Of each surface how many bones lie in it.
+  /// The number of bones in each surface.
   std::vector<Index> own_bones() const;
 
  private:
-  using Length = std::pair<float, Index>;  // of the way to a node, and the bone where it begins
+  using Length = std::pair<float, Index>;  // length of the path to a node, and the bone at its start
   using Nodes = std::vector<std::size_t>;
 
   bool has_bone(std::size_t node) const { return best_[node].second >= 0; }
@@ -49,7 +48,7 @@ class NodeOwners {
   double spacing_;
   const InteriorGraph& graph_;
   const RowMatrix<float>& straight_;
-  std::vector<Index> slots_;  // of the surfaces that may lie around bones; −1: others
+  std::vector<Index> slots_;  // of surfaces with enough samples to enclose bones; −1: others
   Index slot_count_ = 0;
   std::vector<Length> best_;
   std::vector<std::set<Index>> own_;

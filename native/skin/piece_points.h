@@ -7,16 +7,16 @@
 
 namespace arapfields {
 
-/// Points of a shape that may be of several surfaces, which may cut each other: body, hair, shoes.
+/// Points of a shape that may consist of several, possibly intersecting surfaces: body, hair, shoes.
 struct PiecePoints {
   Points points;              ///< (n,3)
   Points normals;             ///< (n,3) unit length, outwards
-  std::vector<Index> pieces;  ///< (n) which surface each lies on, from 0
-  Index count() const;        ///< of surfaces
+  std::vector<Index> pieces;  ///< (n) index of each point's surface
+  Index count() const;        ///< number of surfaces
 };
 
-/// For each of some points the other with the least |p − q|² + turn² |n − m|². Those of a surface on which
-/// there are at least so many others have one of these.
+/// For each point p with normal n the row of `others` (q, m) that minimises |p − q|² + turn² |n − m|². If a
+/// surface has at least `enough` others, its points take one of them.
 std::vector<Index> nearest_on_own(const PiecePoints& points, const PiecePoints& others, double turn,
                                   Index enough);
 

@@ -19,9 +19,9 @@ namespace arapfields {
 namespace {
 
 constexpr Index most_nodes = 4000;
-/// Within so many spacings nodes count as neighbours.
+/// Largest distance of neighbours, in node spacings.
 constexpr double neighbour_spacings = 2.5;
-/// In sizes of the shape, how closely bones are mirrored.
+/// Tolerance of mirrored bones, in sizes of the shape.
 constexpr double symmetric_bones = 5e-3;
 
 const SurfaceSamples& checked(const SurfaceSamples& samples) {
@@ -30,20 +30,21 @@ const SurfaceSamples& checked(const SurfaceSamples& samples) {
   return samples;
 }
 
-/// What of a bone's length holds points, and how many samples it holds at least.
+/// The interval of a bone's length whose surroundings it holds rigidly, and the fewest samples it holds.
 constexpr double hold_from = 0.3, hold_to = 0.7;
 constexpr Index least_held = 12;
-/// A point about a bone's end that is so much nearer to it than to all that follow goes with the bone.
+/// Points beyond the interval are held if they are nearer to the bone than this fraction of each child's
+/// distance.
 constexpr float clearly = 0.5f;
-/// A bone that owns a smaller share of a surface does not move it where parts touch.
+/// Least fraction of a surface's nodes that a bone must own to move it, if unrelated parts touch.
 constexpr double owning_share = 0.05;
-/// Surfaces so many spacings from others that go another way are trusted, as far as touching ones.
+/// Distance, in node spacings, from surfaces of unrelated bones at which trust is 1, and its least value.
 constexpr double trusted_spacings = 4.0, least_trust = 1e-3;
-/// Parts touch where so large a share of the nodes is trusted less than this.
+/// Unrelated parts touch if more than this fraction of the nodes has a trust below doubtful_trust.
 constexpr double doubtful_nodes = 0.03, doubtful_trust = 0.25;
-/// The share of a surface in doubt from which it gets no correctives.
+/// Fraction of such nodes above which a surface gets no correctives.
 constexpr double doubtful_surface = 0.1;
-/// In sizes of the shape, how far a bone may lie from it.
+/// Largest distance of a bone from the shape, in sizes of the shape.
 constexpr double farthest = 0.5;
 
 }  // namespace
@@ -68,7 +69,7 @@ RigShape::RigShape(const SurfaceSamples& given, const std::vector<Bone>& bones, 
     const double middle = 0.5 * (skeleton.bone(b).head + skeleton.bone(b).tail)[symmetry.axis];
     sides.push_back(other < 0 || other == b ? 0 : middle < symmetry.offset ? -1 : 1);
   }
-  // A sphere's area by its radius of gyration.
+  // The mean spacing on a sphere of the same size.
   spacing = std::sqrt(4.0 * std::numbers::pi / static_cast<double>(size())) * extent / 2.5;
   progress.check();
   const InteriorGraph all(nodes.points, nodes.normals, spacing);
@@ -202,7 +203,7 @@ RigShape rig_shape(const TriangleMesh& mesh, const WeldedVertices& welded, const
   std::vector<Index> sizes(welded.first.size(), 0);
   for (const Index piece : pieces) ++sizes[piece];
   const auto is_small = [&](Index piece) { return sizes[piece] < BoneSight::all_sides; };
-  if (2 * std::ranges::count_if(pieces, is_small) > samples.size()) pieces.clear();  // a soup of triangles
+  if (2 * std::ranges::count_if(pieces, is_small) > samples.size()) pieces.clear();  // a triangle soup
   return RigShape(samples, bones, progress, std::move(pieces));
 }
 

@@ -6,7 +6,7 @@
 namespace arapfields {
 namespace {
 
-/// In sizes of the shape: how closely points are mirrored.
+/// Tolerance of mirrored points, in sizes of the shape.
 constexpr double symmetric_points = 1e-4;
 
 }  // namespace

@@ -7,17 +7,17 @@
 
 namespace arapfields {
 
-/// What a rig's symmetry across a plane of the axes means for its bones and for some points; nothing where
-/// the rig has none.
+/// The correspondence of mirrored bones, and of mirrored points, under a rig's symmetry across a coordinate
+/// plane; empty without one.
 struct RigTwins {
   RigTwins(const RigShape& rig, PointsIn points);
 
-  /// The mirrored point, −1 where there is none.
+  /// The mirrored point, −1: none.
   Index twin(Index point) const { return twins.empty() ? -1 : twins[point]; }
-  /// The point nearest to the mirrored place, −1 where none is near. It stands for a twin, so that points
-  /// without one do not differ from their neighbours with one.
+  /// The point nearest to the mirrored place, −1: none is near. It replaces a missing twin, so that points
+  /// without one get weights like their neighbours.
   Index like(Index point) const { return alike.empty() ? -1 : alike[point]; }
-  /// Values (points, bones) averaged with those of the twins, or of the points like them, and mirrored bones.
+  /// Averages values (points, bones) with those of the twins (or their replacements) and mirrored bones.
   void average_twins(RowMatrix<float>& values) const { average(values, twins); }
   void average_alike(RowMatrix<float>& values) const { average(values, alike); }
 

@@ -9,7 +9,7 @@
 namespace arapfields {
 namespace {
 
-/// Of the sum of one, as a heavy row.
+/// Penalty weight of the constraint Σ w = 1, relative to H's mean diagonal.
 constexpr double sum_weight = 10.0;
 
 /// argmin of wᵀHw/2 − gᵀw over w ≥ 0 (Lawson, Hanson 1974, chapter 23, on the normal equations).
@@ -60,7 +60,7 @@ std::vector<Index> positive(const FewBones& w) {
   return result;
 }
 
-/// Which of the used weights costs least to go, when the others take its place: w_j² / (H⁻¹)_jj over the used
+/// The used weight whose removal increases the objective least, w_j² / (H⁻¹)_jj, with the others adapted
 /// (Hassibi, Stork 1993).
 Index cheapest(const BonePairs& h, const FewBones& w, const std::vector<Index>& used) {
   BonePairs part = h(used, used);
@@ -88,7 +88,7 @@ FewBones simplex_minimum(const BonePairs& h, const FewBones& g, int influences) 
   for (;;) {
     const std::vector<Index> used = positive(w);
     if (static_cast<int>(used.size()) <= influences) break;
-    const Index leaving = cheapest(square, w, used);  // a bone that may not enter again
+    const Index leaving = cheapest(square, w, used);  // fixed at 0 from now on
     square.row(leaving).setZero();
     square.col(leaving).setZero();
     square(leaving, leaving) = 1.0;

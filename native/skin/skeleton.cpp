@@ -11,7 +11,7 @@
 namespace arapfields {
 namespace {
 
-/// In lengths of the bone.
+/// Tolerances of copies_length(), in lengths of the bone.
 constexpr double same_length = 1e-4, apart = 1e-2;
 
 std::string name_of(const std::vector<Bone>& bones, Index i) {
@@ -107,7 +107,7 @@ void Skeleton::join_roots() {
 
 Mat3 bone_axes(const Bone& bone) {
   const Vec3 y = (bone.tail - bone.head).normalized();
-  Mat3 shortest = Vec3(-1.0, -1.0, 1.0).asDiagonal();  // straight down, as Blender has it
+  Mat3 shortest = Vec3(-1.0, -1.0, 1.0).asDiagonal();  // the bone points along −y: Blender's convention
   if (y[1] > -1.0 + 1e-9) {
     const double w = std::sqrt(0.5 * (1.0 + y[1]));  // the cosine of half the angle to the y axis
     shortest = Eigen::Quaterniond(w, 0.5 * y[2] / w, 0.0, -0.5 * y[0] / w).toRotationMatrix();
@@ -141,7 +141,7 @@ Skeleton::Symmetry Skeleton::symmetry(double tolerance) const {
     std::vector<double> places;
     for (const Bone& bone : bones_) places.push_back(bone.head[axis]);
     std::ranges::sort(places);
-    // Of a symmetric rig the outermost and the middle heads say where the plane is.
+    // Candidate planes: midway between the outermost heads, through the middle head, and through the origin.
     for (const double offset : {0.5 * (places.front() + places.back()), places[places.size() / 2], 0.0}) {
       Symmetry found{axis, offset, {}, 0};
       const auto reflected = [&](Vec3 p) {

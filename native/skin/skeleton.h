@@ -23,12 +23,12 @@ struct Bone {
   std::string name = {};  ///< for messages
 };
 
-/// Its axes as columns, and the cube [-1,1]³ → a box as long as the bone, which is a handle's place at rest.
+/// A bone's axes as columns, and the map of the cube [-1,1]³ to a box as long as the bone: a handle's rest.
 Mat3 bone_axes(const Bone& bone);
 ARAPFIELDS_EXPORT Mat4 bone_box(const Bone& bone);
 
-/// The deforming bones of a rig, each with the nearest ancestor that deforms. Where there are several roots,
-/// all but that of the largest tree hang on the bone nearest to their heads.
+/// The deforming bones of a rig; a bone's parent is its nearest deforming ancestor. If there are several
+/// roots, all but that of the largest tree become children of the bone nearest to their heads.
 class Skeleton {
  public:
   /// Throws InvalidInput that names the bone: none deforms, numbers that are not finite, parents out of range
@@ -39,12 +39,11 @@ class Skeleton {
   const Bone& bone(Index b) const { return bones_[b]; }  ///< its parent is among the deforming ones
   Index original(Index b) const { return original_[b]; }
   bool is_leaf(Index b) const { return leaf_[b]; }
-  /// Whether only its head is known: of a file's joints importers make the last bone of a chain as long as
-  /// its parent.
+  /// Whether only the head is known: importers of joints give the last bone of a chain its parent's length.
   bool has_open_end(Index b) const { return open_[b]; }
   /// Motions (bones) from rest, from each bone's rotation in its own axes.
   std::vector<Mat4> motions(const std::vector<Mat3>& rotations) const;
-  /// Mirrored bone of each across the plane of the axes where most have one, −1 for none.
+  /// The mirrored bone of each (−1: none) across the coordinate plane with the most pairs.
   struct Symmetry {
     int axis = 0;
     double offset = 0.0;
@@ -53,7 +52,7 @@ class Skeleton {
     bool is_whole() const { return pairs > 0 && std::ranges::find(mirrored, -1) == mirrored.end(); }
   };
   Symmetry symmetry(double tolerance) const;
-  /// Place along a bone, 0 at its head and 1 at its tail, that is nearest to a point.
+  /// Parameter of the bone's closest point, 0 at its head and 1 at its tail.
   double along(Index b, const Vec3& point) const;
   Vec3 nearest(Index b, const Vec3& point) const { return place(b, along(b, point)); }
 

@@ -16,16 +16,16 @@ namespace arapfields {
 namespace {
 
 constexpr std::uint64_t stream = 34;
-/// Poses of a round; each shows most what the round before was farthest from.
+/// Poses of a round; joints with larger errors in the round before rotate more often.
 constexpr int round_poses = 8;
-/// How often each joint turns at least.
+/// Least probability with which a joint rotates in a pose.
 constexpr double least_activity = 0.8;
-/// In sizes of the shape, the diagonals of closed pieces that stay rigid: eyes may be large.
+/// Largest diagonal of closed pieces that stay rigid, in sizes of the shape: eyes may be large.
 constexpr double rigid_size = 0.2;
-/// The share of a piece's weights from which one bone has them all.
+/// Fraction of a piece's weights above which one bone gets all of them.
 constexpr float one_bone = 0.8f;
 
-/// The joints' shares in the errors of a round, as probabilities to turn.
+/// Probabilities of the joints to rotate, from their fractions of the errors of a round.
 Vector activity_of(const RigShape& rig, const Vector& errors) {
   Vector result = Vector::Zero(rig.skeleton.count());
   for (Index i = 0; i < rig.size(); ++i) {
@@ -43,7 +43,7 @@ struct Fitted {
   std::vector<ExamplePose> poses;
 };
 
-/// The poses have the nodes and then these points.
+/// Fits the nodes' weights to example poses; the poses' shapes have the nodes and then these points.
 Fitted fitted_nodes(const RigShape& rig, PointsIn points, const std::vector<Index>& near,
                     const SkinOptions& options, const Progress& progress) {
   Points moved(rig.size() + points.rows(), 3);
@@ -97,13 +97,13 @@ RowMatrix<float> fitted_points(const RigShape& rig, const PiecePoints& given, co
   return result;
 }
 
-/// The largest `influences` of a row ≥ 0 that are larger than all others, of sum one.
+/// Keeps the largest `influences` entries of a row (fewer where entries are tied), and normalises it.
 void keep_largest(Eigen::Ref<RowMatrix<float>> row, int influences) {
   row = row.cwiseMax(0.0f);
   std::vector<float> sorted(row.data(), row.data() + row.size());
   if (static_cast<int>(sorted.size()) > influences) {
     std::ranges::nth_element(sorted, sorted.begin() + influences, std::greater<>());
-    const float next = sorted[influences] * (1.0f + 1e-4f);  // mirrored bones' weights stay or go together
+    const float next = sorted[influences] * (1.0f + 1e-4f);  // equal weights of mirrored bones are tied
     const float most = row.maxCoeff();
     if (next < most) row = (row.array() > next).select(row, 0.0f);
   }
@@ -111,7 +111,7 @@ void keep_largest(Eigen::Ref<RowMatrix<float>> row, int influences) {
   row /= row.sum();
 }
 
-/// Each small closed piece gets one motion: of one bone, where that moves nearly all of it.
+/// Gives each small closed piece uniform weights: those of one bone if it has nearly all of them.
 void make_rigid(const RigShape& rig, const TriangleMesh& mesh, const WeldedVertices& welded,
                 RowMatrix<float>& weights) {
   const std::vector<Index> pieces = welded.pieces(mesh);
@@ -128,7 +128,7 @@ void make_rigid(const RigShape& rig, const TriangleMesh& mesh, const WeldedVerti
   }
 }
 
-/// The columns of all bones, from those of the deforming ones.
+/// Expands the columns of the deforming bones to those of all bones.
 RowMatrix<float> finished(const RigShape& rig, RowMatrix<float> fitted, Index bones, int influences) {
   RowMatrix<float> result = RowMatrix<float>::Zero(fitted.rows(), bones);
   parallel_for(0, fitted.rows(), 256, [&](Index first, Index last) {

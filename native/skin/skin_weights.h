@@ -14,15 +14,15 @@
 namespace arapfields {
 
 /// Weights (n, bones) of a mesh's vertices: ≥ 0, of sum one, at most options.influences of them above 0 a
-/// vertex. The field poses the shape by its bones; the weights are those under which linear blend skinning
-/// comes nearest to it. They depend on where vertices and triangles are, not on how they are joined: several
-/// meshes may be one list. Small closed pieces get one motion. A rig that is symmetric across a plane of the
-/// axes gives symmetric weights to vertices that are. `painted` is the vertices' stiffness. Throws
-/// InvalidInput as sample_mesh and Skeleton do, and for a bone far outside; Cancelled.
+/// vertex. They are a least-squares fit of linear blend skinning to the field, whose handles are the bones,
+/// over example poses. They do not depend on connectivity: several meshes may be concatenated. Small closed
+/// pieces move rigidly. A rig that is symmetric across a coordinate plane gives symmetric weights to
+/// symmetric vertices. `painted` is the vertices' stiffness. Throws InvalidInput as sample_mesh and Skeleton
+/// do, and for a bone far outside; Cancelled.
 ARAPFIELDS_EXPORT RowMatrix<float> skin_weights(const TriangleMesh& mesh, const std::vector<Bone>& bones,
                                                 const SkinOptions& options, const Progress& progress = {},
                                                 const VertexWeights& painted = {});
-/// The same of samples of a surface.
+/// The same for samples of a surface.
 ARAPFIELDS_EXPORT RowMatrix<float> skin_weights(const SurfaceSamples& samples, const std::vector<Bone>& bones,
                                                 const SkinOptions& options, const Progress& progress = {});
 

@@ -10,11 +10,11 @@
 namespace arapfields {
 namespace {
 
-/// Nodes within so many spacings are blended; a node of the other side counts by so much.
+/// Support radius, in node spacings, and the factor on the weight of nodes on the other side.
 constexpr double reach = 2.5, other_side = 1e-4;
-/// Slopes are damped by this, which matters where few nodes are near.
+/// Tikhonov term on the gradient, for points with few nodes nearby.
 constexpr double damping = 0.05;
-/// Where a node would count by less, all lie to one side of the point, and their mean serves.
+/// Least weight of a node; below it the point lies beside all nodes, and the weighted mean is used.
 constexpr double least_weight = -0.25;
 
 }  // namespace

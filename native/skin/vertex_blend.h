@@ -7,11 +7,11 @@
 
 namespace arapfields {
 
-/// Values at a rig's nodes taken to other points of the surface: linear where the nodes are, from those of
+/// Interpolates values at a rig's nodes to other points by moving least squares of first order, from nodes of
 /// the same surface and side.
 class VertexBlend {
  public:
-  /// Of some points and their nearest nodes.
+  /// For these points and their nearest nodes.
   VertexBlend(const RigShape& rig, const PiecePoints& given, const std::vector<Index>& nearest);
 
   /// Values (nodes, k) at the points (n, k).

@@ -13,13 +13,13 @@ namespace arapfields {
 namespace {
 
 constexpr int sweeps = 20;
-/// How often the support is averaged over each node's neighbours.
+/// Smoothing sweeps of the support over each node's neighbours.
 constexpr int support_sweeps = 6;
-/// A bone wanted as little as one that is left out costs infinitely much; others less, by this power of the
-/// ratio.
+/// Exponent of the cost of a bone by the ratio of the largest support left out to its own: infinite at 1.
 constexpr double leaving_power = 4.0;
 
-/// A point's weights of the bones that are wanted most, at most so many. None comes or goes with a jump.
+/// Weights of the `influences` bones with the largest support (`wanted`); they vanish continuously where a
+/// bone is replaced by another.
 FewBones among_wanted(const BonePairs& squares, double stiff, const FewBones& g, const FewBones& wanted,
                       int influences) {
   FewBones sorted = wanted;

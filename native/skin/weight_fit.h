@@ -19,16 +19,16 @@ class WeightFit {
  public:
   explicit WeightFit(const RigShape& rig);
 
-  /// Takes a pose into account, whose first rows are the nodes'.
+  /// Adds a pose, whose first rows are the nodes'.
   void add(const ExamplePose& pose);
   /// Solves for the weights.
   void solve(double smoothness, const Progress& progress);
   /// (nodes, bones)
   const RowMatrix<float>& weights() const { return weights_; }
-  /// How much each bone is wanted (nodes, bones) where so few may move a node: the mean over the nodes about
-  /// it of the weights of the fit with so few, which alone would change from one node to the next.
+  /// Preference of each bone (nodes, bones) for selecting `influences` of them: the weights of a fit with so
+  /// few, smoothed over neighbouring nodes, without which the selection would change from node to node.
   RowMatrix<float> support(double smoothness, int influences) const;
-  /// Squared distances (nodes) of the weights' shape from a pose's, in sizes of the shape.
+  /// Squared distances (nodes) of the skinned nodes from a pose's shape, in squared sizes of the shape.
   Vector squared_errors(const ExamplePose& pose) const;
 
  private:
@@ -36,24 +36,24 @@ class WeightFit {
 
   const RigShape& rig_;
   std::vector<BoneChoice> choices_;
-  std::vector<BonePairs> squares_;  // over all poses
+  std::vector<BonePairs> squares_;  // sums of the Gram matrices over all poses
   Index poses_ = 0;
   RowMatrix<float> weights_;
 };
 
-/// Points of a rig's shape beside its nodes, and what the nodes tell there.
+/// Points of a rig's shape other than its nodes, with values interpolated from the nodes.
 struct SkinPoints {
   const Points& places;
-  const std::vector<Index>& near;  ///< the nodes that they are nearest to
+  const std::vector<Index>& near;  ///< the nearest node of each
   RowMatrix<float> weights;        ///< (points, bones) as of WeightFit
   RowMatrix<float> support;        ///< (points, bones) as of WeightFit
-  RowMatrix<float> distances;      ///< (points, bones) through the inside
+  RowMatrix<float> distances;      ///< (points, bones) interior distances
   RigTwins twins;
 };
 
-/// Weights of points, at most `influences` a point above 0, that reproduce the same poses, whose rows after
-/// the nodes' are the points'. What the poses leave open is as the nodes' weights there, and which bones it
-/// may be is told by their support.
+/// Weights of points, at most options.influences above 0 a point, fitted to the same poses, whose rows after
+/// the nodes' are the points'. They are regularised towards the interpolated weights of the nodes; the bones
+/// are selected by their support.
 RowMatrix<float> point_weights(const RigShape& rig, const SkinPoints& points, const LimbSides& limbs,
                                const std::vector<ExamplePose>& poses, const SkinOptions& options);
 

@@ -143,7 +143,7 @@ Similarity by_shape(const WrapSource& source, const WrapTarget& target, double s
     candidates.push_back(coarse.improve(at, coarse_rounds));
     progress.check();
   }
-  std::sort(candidates.begin() + 1, candidates.end(),  // the first, which is not turned, is in the final
+  std::sort(candidates.begin() + 1, candidates.end(),  // the identity, the first, is always refined
             [](const auto& a, const auto& b) { return a.first < b.first; });
   std::pair<double, Similarity> best = fine.improve(candidates[0].second, fine_rounds);
   double least = turn_gain * best.first;

@@ -18,14 +18,14 @@ struct WrapSource {
 
   /// The same surface with these of its landmarks.
   WrapSource with_landmarks(const std::vector<Index>& rows) const;
-  /// Distances of the landmarks, so placed, to their targets.
+  /// Distances (k) of the landmarks under this placement to their targets.
   Vector distances(const Similarity& placement) const;
 };
 
-/// The similarity that takes points to others in weighted least squares; `scale` 0: its own.
+/// The similarity that maps points to others in weighted least squares; `scale` is fixed unless 0.
 Similarity fitted_similarity(PointsIn from, PointsIn to, const Vector& weights, double scale);
 
-/// The size of points about their mean.
+/// The radius of gyration of points: their root mean square distance from the mean.
 double gyration(PointsIn points);
 /// "landmarks[i]".
 std::string landmark_name(Index i);
@@ -34,13 +34,14 @@ std::string percent_text(double share);
 
 /// Throws InvalidInput that names a landmark which is not finite or far off its surface.
 void check_landmarks(const WrapSource& source, const WrapTarget& target);
-/// Throws InvalidInput that names two landmarks, of these ascending rows, that coincide on one surface alone.
+/// Throws InvalidInput that names two landmarks, of these ascending rows, that coincide on one surface and
+/// are far apart on the other.
 void check_contradictions(const WrapSource& source, const WrapTarget& target, const std::vector<Index>& rows);
 
-/// The similarity, cube → the target's coordinates, with which a wrap begins. With three landmarks or more it
-/// is their least-squares fit; else it is the result of iterative closest points (Besl, McKay 1992) from no
-/// rotation, or from one that aligns the principal axes where that is far better. `normal_weight` weights
-/// normals beside distances. Appends to `warnings`.
+/// The initial similarity of a wrap, from the cube to the target's coordinates. With three landmarks or more
+/// it is their least-squares fit; else the result of iterative closest points (Besl, McKay 1992), started
+/// without rotation, or with one that aligns the principal axes if that is far better. `normal_weight` is the
+/// weight of differences of normals relative to distances. Appends to `warnings`.
 Similarity wrap_alignment(const WrapSource& source, const WrapTarget& target, AlignmentKind kind,
                           double normal_weight, std::vector<std::string>& warnings, const Progress& progress);
 

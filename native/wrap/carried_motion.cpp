@@ -13,15 +13,17 @@
 namespace arapfields {
 namespace {
 
-/// Length, as a share of the diagonal, over which motions keep to J δ, and over which J is smoothed.
+/// The length L, as a fraction of the diagonal, below which differences prevail over M(δ), and over which J
+/// is smoothed.
 constexpr double reach = 0.03;
 /// Least cotangent weight: obtuse triangles would have negative ones, which fold.
 constexpr double least_weight = 0.01;
-/// Deviation of an edge between two places from the edge itself, as a share, at which it is not believed.
+/// Relative deviation of J times the edge between two places from the receiving edge, above which the places
+/// contradict it.
 constexpr double contradiction = 0.5;
-/// Motions below this share of the largest are 0 where the giving mesh does not move.
+/// Displacements below this fraction of the largest are set to 0 where the giving mesh does not move.
 constexpr double no_motion = 1e-4;
-/// Solves at most after the first, each with half the differences about triangles that fold.
+/// Most solves after the first, each with the differences at folded triangles halved.
 constexpr int most_rounds = 6;
 
 }  // namespace
@@ -56,7 +58,7 @@ CarriedMotion::CarriedMotion(const TriangleMesh& giving, const TriangleMesh& rec
   const double length = reach * diagonal_of(receiving.vertices);
   anchors_ = areas / std::max(length * length, 1e-300);
   for (Index v = 0; v < count; ++v)
-    if (!(anchors_[v] > 0.0)) anchors_[v] = 1.0;  // loose vertices, and all but the first at a position
+    if (!(anchors_[v] > 0.0)) anchors_[v] = 1.0;  // isolated vertices, and duplicates at a position
   std::vector<Eigen::Triplet<double>> entries;
   for (Index v = 0; v < count; ++v) entries.emplace_back(v, v, anchors_[v]);
   edges_.reserve(weights.size());
@@ -73,7 +75,7 @@ CarriedMotion::CarriedMotion(const TriangleMesh& giving, const TriangleMesh& rec
   factor_.factorize(matrix);
   progress.check();
 
-  // J without what is finer than the reach.
+  // Smooths J over the length L.
   Eigen::Matrix<double, Eigen::Dynamic, 9> smooth(count, 9);
   for (Index v = 0; v < count; ++v)
     smooth.row(v) = anchors_[v] * Eigen::Map<const Eigen::Matrix<double, 1, 9>>(jacobians_[first_[v]].data());
@@ -112,7 +114,7 @@ void CarriedMotion::add_edges() {
   }
 }
 
-/// Of the giving vertices, the mean over the triangles about each.
+/// Gradients of the giving vertices' displacements: area-weighted means over their triangles.
 std::vector<Mat3> CarriedMotion::gradients(PointsIn given) const {
   std::vector<Mat3> result(given.rows(), Mat3::Zero());
   Vector areas = Vector::Zero(given.rows());
@@ -193,7 +195,7 @@ bool CarriedMotion::spare_folds(PointsIn given, const Points& moved, Vector& kep
   for (Index t = 0; t < receiving_.triangles.rows(); ++t)
     if (folds(receiving_, t, [&](Index v) -> Vec3 { return moved.row(first_[v]); })) folded.push_back(t);
   if (folded.empty()) return false;
-  std::vector<bool> meant(given.rows(), false);  // a triangle about the giving vertex folds too
+  std::vector<bool> meant(given.rows(), false);  // whether a triangle of the giving vertex folds too
   for (Index t = 0; t < giving_.triangles.rows(); ++t)
     if (folds(giving_, t, [&](Index g) -> Vec3 { return given.row(g); }))
       for (int k = 0; k < 3; ++k) meant[giving_first_[giving_.triangles(t, k)]] = true;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Displacements of one mesh on another: differences along edges are carried, not places.
+// Transfer of displacements from one mesh to another by their differences along edges.
 #pragma once
 
 #include <Eigen/SparseCholesky>

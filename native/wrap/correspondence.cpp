@@ -11,7 +11,8 @@ namespace {
 
 using namespace wrap_parameters;
 
-/// Differences beyond so many usual ones count for little; the usual one is the second times the median.
+/// Differences of curvature above curvature_outlier standard deviations are outliers; the standard deviation
+/// is estimated as deviation_of_median times the median of absolute differences.
 constexpr double curvature_outlier = 2.0, deviation_of_median = 1.48;
 
 /// Weight of a pair by its normals (Rusinkiewicz, Levoy 2001, section 3.4).
@@ -92,7 +93,7 @@ CorrespondenceTerms::CorrespondenceTerms(const WrapTarget& target, const Surface
     const Vec3 displacement = (target.points.row(k) - points.row(i)).transpose(),
                normal = target.normals.row(k);
     double weight = compatibility(normal, normals.row(i)) * target.interior[k];
-    if (!target.closed && weight > 0.0) {  // only if the way back ends near its start
+    if (!target.closed && weight > 0.0) {  // only if the closest point of the closest point is near
       const double missed = (points.row(source_of[k]) - points.row(i)).norm();
       if (missed > return_spacings * target.spacing + return_share * displacement.norm()) weight = 0.0;
     }

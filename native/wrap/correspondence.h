@@ -10,17 +10,17 @@ namespace arapfields {
 /// Weights of the correspondences between a surface and a target.
 struct CorrespondenceWeights {
   double weight = 1.0;      ///< of the mean squared distance
-  double coverage = 1.0;    ///< of distances from the target's samples, beside those from the surface's
-  double normals = 0.3;     ///< of differences of unit normals, beside distances in cube units
-  double tangential = 0.1;  ///< of tangential distances, beside normal ones
-  double curvature = 0.0;   ///< of squared differences of curvatures, in units of the usual ones
+  double coverage = 1.0;    ///< of distances from the target's samples, relative to those from the surface's
+  double normals = 0.3;     ///< of differences of unit normals, relative to distances in cube units
+  double tangential = 0.1;  ///< of tangential distances, relative to normal ones
+  double curvature = 0.0;   ///< of squared differences of curvatures, relative to their typical size
   double unoriented = 0.0;  ///< of distances to nearest points without regard to normals
 };
 
 /// Points of a surface in motion.
 struct SurfacePoints {
   Points points, normals;  ///< (n,3), the normals of length 1
-  Vector area_weights;     ///< (n) share of the surface's area that each point represents; their sum is 1
+  Vector area_weights;     ///< (n) fraction of the surface's area that each point represents; their sum is 1
   RowMatrix<double> curvatures{};  ///< (n,2) as those of the target; empty where they are not compared
 };
 
@@ -34,7 +34,8 @@ struct ARAPFIELDS_EXPORT_TO_TESTS CorrespondenceTerms {
 
   CorrespondenceTerms(const WrapTarget& target, const SurfacePoints& surface,
                       const CorrespondenceWeights& weights);
-  /// Draws points along the surface to places (n,3); at `distance` a place counts a quarter.
+  /// Adds the tangential distances to places (n,3). The weight falls off with the distance from a place; it
+  /// is a quarter at `distance`.
   void add_along(const SurfacePoints& surface, PointsIn places, double weight, double distance);
 
  private:

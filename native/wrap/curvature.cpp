@@ -9,9 +9,9 @@
 namespace arapfields {
 namespace {
 
-/// Points farther than so many radii, at which the weight is exp(−4), do not count.
+/// Cut-off of the Gaussian weights, in radii: exp(−4) there.
 constexpr double reach = 2.0;
-/// Tikhonov term of the fits, a share of the sum of weights: few points on a line leave a plane.
+/// Tikhonov term of the fits, as a fraction of the sum of weights: few or collinear points then give a plane.
 constexpr double fit_ridge = 1e-4;
 
 /// Calls visit(row, u, v, h, weight) for the points about a place, in its tangent frame and in radii.

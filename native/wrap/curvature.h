@@ -7,7 +7,7 @@
 namespace arapfields {
 
 /// Curvature of a surface at n points, times a radius: the mean of the principal curvatures, and half of
-/// their difference. It tells apart places along which a surface slides without coming off another.
+/// their difference. It identifies places that distances cannot, along which a surface slides on another.
 struct SurfaceCurvature {
   double radius = 0.0;          ///< of the fits
   RowMatrix<double> values;     ///< (n,2)

@@ -18,15 +18,16 @@ namespace arapfields {
 namespace {
 
 using namespace wrap_parameters;
-// Tuned: on known maps, with unlike shapes as near to their targets as without.
+// Tuned on pairs with a known map, such that unlike shapes come as near to their targets as without it.
 
-/// Weight in the last stage of distances along the surface to where the smoothest map through its places
-/// takes it (SmoothingSpline), beside those of correspondences across it: of places it takes the noise.
+/// Weight in the last stage of tangential distances to the smoothing spline through the surface's current
+/// places (SmoothingSpline), relative to correspondences: it removes tangential noise.
 constexpr double smooth_weight = 0.6;
-/// Places that make the map, and how little each counts there.
+/// Places that the spline fits, and its smoothing parameter there.
 constexpr Index map_places = 1000;
 constexpr double smoothing = 1e-3;
-/// Distance at which the map counts a quarter, a share of the diagonal: where it misses by more, sheets part.
+/// Distance from the spline, as a fraction of the diagonal, at which its weight is a quarter: larger ones
+/// occur where sheets of the surface separate.
 constexpr double smooth_distance = 0.002;
 
 using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
@@ -86,7 +87,7 @@ Points moved_normals(const RowMatrix<double>& jacobians, PointsIn normals, Vecto
   return result;
 }
 
-/// The samples in one step's equations, denser where the surface has grown.
+/// The samples in one step's equations, with a density between those of the rest area and the current area.
 struct WrapFlow::StepSamples {
   SurfacePoints surface;  // area weights: the mean of those at rest and now
   RowMatrix<double> jacobians;
@@ -122,8 +123,7 @@ WrapFlow::StepSamples WrapFlow::draw_samples(Index count) {
   const Index all = points_.rows();
   Vector growth;
   const Points normals = moved_normals(jacobians_, rest_normals_, growth);
-  const Vector density =
-      0.5 * (growth / growth.sum()).array() + 0.5 / static_cast<double>(all);  // of which the sum is 1
+  const Vector density = 0.5 * (growth / growth.sum()).array() + 0.5 / static_cast<double>(all);  // sums to 1
   std::vector<Index> rows;
   double passed = random_.uniform() / static_cast<double>(count);
   double sum = 0.0;
@@ -140,7 +140,7 @@ WrapFlow::StepSamples WrapFlow::draw_samples(Index count) {
   chosen.rest = rows_of(rest_points_, rows);
   chosen.jacobians = jacobians_(rows, Eigen::all);
   if (curvatures_.size() > 0)
-    chosen.surface.curvatures =  // as the surface grows, it bends less
+    chosen.surface.curvatures =  // curvature scales with the inverse length
         growth(rows).array().rsqrt().matrix().asDiagonal() * curvatures_(rows, Eigen::all);
   Vector represented = density(rows) * static_cast<double>(count);
   represented = represented.cwiseMin(1.0).cwiseInverse();

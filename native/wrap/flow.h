@@ -27,7 +27,7 @@ struct WrapStage {
   Index centers = 60;          ///< their number
 };
 
-/// How freely a surface slides along the target.
+/// Weights of tangential distances, which limit sliding along the target.
 struct SlidingSchedule {
   wrap_parameters::Schedule tangential = wrap_parameters::tangential_weight;
   bool is_smooth = true;  ///< in the last stage the surface follows the smoothest map through its places
@@ -36,11 +36,11 @@ struct SlidingSchedule {
 /// The sliding of coarse wraps that judge landmarks.
 constexpr SlidingSchedule coarse_sliding{wrap_parameters::coarse_tangential_weight, false};
 
-/// The landmarks that a flow pulls onto their targets; the others go along.
+/// The landmarks whose distances enter the flow's equations; the others move passively.
 struct LandmarkPull {
   std::vector<Index> rows;  ///< which of the landmarks
   double weight = 0.0;      ///< of their mean squared distance, in the first stage
-  double growth = 1.0;      ///< of the weight, up to the last stage
+  double growth = 1.0;      ///< factor on the weight in the last stage
 };
 
 /// A surface that flows onto an aligned target, in the source's cube. Each step solves for a smooth velocity
@@ -70,7 +70,7 @@ class WrapFlow {
  private:
   struct StepSamples;
   StepSamples draw_samples(Index count);
-  /// Where the smoothest map through the samples' current places takes rest points.
+  /// Images of rest points under the smoothing spline through the samples' current places.
   Points smooth_places(PointsIn rest, const Progress& progress);
   RadialBasis basis(const WrapStage& stage, PointsIn points);
   void move(const RadialBasis& basis, RowMatrix<double> velocity, PointsIn points);
@@ -84,13 +84,13 @@ class WrapFlow {
   Points landmarks_, landmark_targets_;
   LandmarkPull pull_;
   std::vector<Index> spline_rows_;
-  std::optional<SmoothingSpline> spline_;  // of these samples, once it is needed
+  std::optional<SmoothingSpline> spline_;  // of these samples, made at first use
   std::vector<FieldStep> steps_;
   double matched_share_ = 1.0;
 };
 
-/// Unit normals of a moved surface, from its unit normals at rest and the motion's Jacobians (n,9), by
-/// cofactors; `growth` (n) gets the factor of each area.
+/// Unit normals of a moved surface, from its unit rest normals and the motion's Jacobians (n,9), by the
+/// cofactor matrix; `growth` (n) gets the area ratios.
 Points moved_normals(const RowMatrix<double>& jacobians, PointsIn normals, Vector& growth);
 
 }  // namespace arapfields

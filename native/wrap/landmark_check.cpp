@@ -16,41 +16,42 @@
 namespace arapfields {
 namespace {
 
-// All distances are shares of the target's diagonal.
+// All distances are fractions of the target's diagonal.
 
-/// Pairs that it takes to say which of them is wrong, and the largest share of wrong ones.
+/// Fewest pairs among which outliers can be found, and the largest fraction of outliers.
 constexpr Index least_pairs = 4;
 constexpr double most_wrong = 0.4;
-/// Triples that are tried at most, rounds of reweighting of each, and the range of their scale about the
-/// ratio of the shapes' sizes.
+/// Most triples, rounds of iteratively reweighted least squares for each, and the largest factor between the
+/// scale of a triple's similarity and the ratio of the shapes' sizes.
 constexpr Index most_triples = 600;
 constexpr int reweightings = 3;
 constexpr double scale_range = 3.0;
-/// Distance at which a pair counts half (Geman, McClure 1987).
+/// Scale of the robust penalty d²/(d² + half_distance²) (Geman, McClure 1987).
 constexpr double half_distance = 0.15;
-/// Placements that are tried, those that differ by as much, and how much worse than the best they may be.
+/// Candidate similarities that are tried: their number, the least difference of some pair's distance between
+/// two of them, and the bounds of their penalty, relative and absolute, above that of the best.
 constexpr std::size_t most_placements = 3;
 constexpr double differ = 0.1, worse_factor = 1.3, worse = 0.2;
-/// Where the best placement brings all pairs as near, none is in doubt.
+/// If the best similarity brings all pairs within this distance, there are no outliers.
 constexpr double no_doubt = 0.05;
-/// A pair is wrong if it stays as many medians away, and at least and at most as far (tuned).
+/// A pair is an outlier if its distance exceeds `medians` medians, clamped to these bounds (tuned).
 constexpr double medians = 2.5, least_far = 0.08, most_far = 0.13;
-/// One that was left out is right all the same where a wrap without it brings it as near.
+/// An outlier is an inlier again if a wrap without it brings it within this distance.
 constexpr double near_anyway = 0.03;
-/// It returns if a wrap that pulls firmly brings it within as many medians, or so near, and the stretch grows
-/// by no more than this, or all of the surface comes this much nearer to the target; where it is farther away
-/// without, it is not tried (tuned).
+/// take_back(): a pair farther than `may_return` is not tried. With it and the high weight, its distance must
+/// be below `medians` medians or firmly_near, and the stretch grow at most by the factor more_stretch plus
+/// least_stretch, or the surface's distance from the target fall to the fraction much_nearer (tuned).
 constexpr double firmly_near = 0.045, more_stretch = 1.1, least_stretch = 0.02, may_return = 0.35;
 constexpr double much_nearer = 0.8;
-/// Rounds of a wrap, and the factor by which a mirror image must fit better.
+/// Most rounds of wraps from one similarity, and the factor by which a mirror image must fit better.
 constexpr int rounds = 4;
 constexpr double mirrored_gain = 2.0;
-/// The coarse wrap.
+/// Options of the coarse wrap, its low and high factors on the landmark weight, and its target's samples.
 constexpr int coarse_centers = 100, coarse_stages = 3, coarse_iterations = 3;
 constexpr double soft_pull = 0.3, firm_pull = 2.0;
 constexpr Index coarse_target_samples = 3000;
 
-/// Penalties of distances, each below 1 and their sum.
+/// Sum of the robust penalties of distances, each below 1.
 double penalty(const Vector& distances) {
   const auto squares = distances.array().square();
   return (squares / (squares + half_distance * half_distance)).sum();
@@ -78,7 +79,7 @@ std::vector<std::array<Index, 3>> triples(Index count, std::uint64_t seed) {
   return result;
 }
 
-/// Placements by triples, improved with all pairs, the best first.
+/// Similarities from triples, refined with all pairs, in ascending order of their penalties.
 std::vector<Placement> placements(const WrapSource& source, const WrapTarget& target, double scale,
                                   std::uint64_t seed, const Progress& progress) {
   const double size = gyration(target.points) / gyration(source.points);
@@ -114,14 +115,14 @@ std::vector<Placement> distinct(const std::vector<Placement>& all) {
   return result;
 }
 
-/// What a coarse wrap that pulls at some pairs makes of all of them.
+/// Results of a coarse wrap that uses some pairs as landmarks.
 struct Trial {
-  Vector distances;
+  Vector distances;  // of all pairs
   double stretch = 0.0;
-  double distance = 0.0;  // of the surface to the target
+  double distance = 0.0;  // mean, from the surface to the target
 };
 
-/// Which pairs agree, by wraps from one placement.
+/// Classifies pairs by coarse wraps, and keeps the best result over several initial similarities.
 class Vote {
  public:
   Vote(const SurfaceSamples& samples, const WrapSource& source, const WrapTarget& target,
@@ -163,9 +164,9 @@ class Vote {
     last_ = std::move(trial);
   }
 
-  /// The pairs that agree with each other; none where too few do.
+  /// The inliers; none if there are too few.
   const std::optional<std::vector<Index>>& kept() const { return kept_; }
-  /// How far the wrap without them leaves those left out.
+  /// Distances of all pairs after the wrap with the inliers.
   const Vector& distances() const { return last_.distances; }
 
  private:
@@ -183,7 +184,7 @@ class Vote {
     return fitted_similarity(some.landmarks, some.landmark_targets,
                              Vector::Ones(static_cast<Index>(rows.size())), scale);
   }
-  /// As many as must agree.
+  /// The pairs with the smallest distances, as many as there must be inliers.
   std::vector<Index> nearest_of(const Trial& trial) const {
     std::vector<Index> result(trial.distances.size());
     std::iota(result.begin(), result.end(), 0);
@@ -192,7 +193,7 @@ class Vote {
     std::ranges::sort(result);
     return result;
   }
-  /// As many medians of the pulled pairs' distances as make one doubtful.
+  /// `medians` times the median distance of the landmarks in use.
   static double spread(const Trial& trial, const std::vector<Index>& pulled) {
     std::vector<double> sorted;
     for (const Index row : pulled) sorted.push_back(trial.distances[row]);
@@ -211,8 +212,8 @@ class Vote {
     return result;
   }
 
-  /// A pair that others had pushed away, or the pose, returns where a firm pull reaches it without more
-  /// stretch, or brings the surface nearer to the target: to reach a wrong place, it stretches and leaves it.
+  /// Returns outliers one by one to the inliers if a wrap with the high landmark weight reaches them with
+  /// little more stretch, or brings the surface nearer to the target. A wrong pair would do neither.
   void take_back(const Similarity& at, std::vector<Index>& kept, Trial& trial) const {
     std::vector<Index> away;
     for (Index row = 0; row < trial.distances.size(); ++row)

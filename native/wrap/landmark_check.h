@@ -15,11 +15,11 @@ struct LandmarkVerdict {
   std::vector<Index> kept, left_out;
 };
 
-/// Leaves out pairs that contradict the others. Similarities that most pairs agree with come from triples of
-/// them (Fischler, Bolles 1981, "Random Sample Consensus"), and a coarse, softly pulled wrap from each then
-/// says what stays far from its target, unless a firm pull brings it there without stretch, or the surface
-/// nearer to the target. Where too many do, all are kept and `warnings` says so. Throws InvalidInput where
-/// the pairs are those of a mirror image.
+/// Finds outliers among the landmark pairs. Candidate similarities come from triples of pairs (Fischler,
+/// Bolles 1981, "Random Sample Consensus"). A coarse wrap from each, with a low landmark weight, shows the
+/// pairs that stay far from their targets; one of them is kept after all if a high weight brings it there
+/// with little more stretch, or brings the surface nearer to the target. With too many outliers all pairs are
+/// kept, with a warning. Throws InvalidInput if the pairs are those of a mirror image.
 LandmarkVerdict trusted_landmarks(const SurfaceSamples& samples, const WrapSource& source,
                                   const WrapTarget& target, const WrapOptions& options,
                                   std::vector<std::string>& warnings, const Progress& progress);

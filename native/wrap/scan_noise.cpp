@@ -14,26 +14,26 @@
 namespace arapfields {
 namespace {
 
-/// Rounds that average normals, which noise turns anywhere where it is larger than the edges.
+/// Rounds of averaging normals, which are arbitrary where noise is larger than the edges.
 constexpr int normal_rounds = 3;
-/// Differences beyond so many times the usual one count as that.
+/// Values are clamped to this multiple of the median absolute value.
 constexpr double outlier = 3.7;
-/// Pairs of neighbours that tell of noise, at least.
+/// Fewest pairs of neighbours for an estimate.
 constexpr Index least_pairs = 500;
-/// Of what first and second differences disagree by, what second differences of a shape itself have at most.
-/// Source: clean meshes of 500 to 60,000 vertices; of 37 one coarse and shaggy one has more.
+/// The shape's part in the estimate by second Laplacians, as a fraction of the difference of both estimates:
+/// the largest seen on 37 clean meshes of 500 to 60,000 vertices, but for one coarse and shaggy one.
 constexpr double shape_share = 0.35;
-/// Noise, a share of the diagonal, of which a half is smoothed away.
+/// Standard deviation, as a fraction of the diagonal, of noise that is reduced by half.
 constexpr double harmless_noise = 0.0003;
-/// Rounds of smoothing, and the two steps of each: waves longer than about eight edges stay.
+/// Iterations of Taubin smoothing and its two factors: wavelengths above about eight edges are kept.
 constexpr int smoothing_rounds = 20;
 constexpr double smoothing_step = 0.5;
 constexpr double smoothing_back = 0.52;
-/// What smoothing moves along the normals, in deviations of the noise: the median at most, where it is noise
-/// (0.7; 1.1 and more were seen on clean and coarse meshes with edges), and each vertex.
+/// Bounds of the smoothing's displacements along the normals, in standard deviations of the noise: of their
+/// median (0.7 for noise; 1.1 and more on clean and coarse meshes with edges), and of each vertex.
 constexpr double median_move = 1.0, most_move = 4.0;
 
-/// Each vertex's neighbours, once for each triangle that joins them; vertices at one place are one.
+/// Each vertex's neighbours, once for each common triangle; vertices are welded by position.
 class Neighbours {
  public:
   Neighbours(const TriangleMesh& mesh, const std::vector<std::int32_t>& first)
@@ -49,7 +49,7 @@ class Neighbours {
     for (std::size_t v = 0; v < first.size(); ++v) begin_[v + 1] += begin_[v];
     others_.resize(begin_.back());
     std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
-    std::vector<std::int64_t> turn(first.size(), 0);  // 0 where the triangles about a vertex close a fan
+    std::vector<std::int64_t> turn(first.size(), 0);  // 0 if a vertex's triangles form a closed fan
     each_edge([&](std::int32_t a, std::int32_t b) {
       others_[next[a]++] = b;
       others_[next[b]++] = a;
@@ -65,7 +65,7 @@ class Neighbours {
     for (std::size_t k = begin_[v]; k < begin_[v + 1]; ++k) visit(others_[k]);
   }
 
-  /// Values (n,k) minus the means of their neighbours'.
+  /// The (negative umbrella) Laplacian: values (n,k) minus the means of their neighbours.
   template <class Values>
   Values differences(const Values& values) const {
     Values result = Values::Zero(values.rows(), values.cols());
@@ -85,7 +85,7 @@ class Neighbours {
   std::vector<bool> border_;
 };
 
-/// Pairs of neighbours without a border near them.
+/// Pairs of neighbours whose 1-rings do not touch a border.
 std::vector<std::pair<std::int32_t, std::int32_t>> inner_pairs(const Neighbours& neighbours) {
   std::vector<bool> inner(neighbours.size());
   for (Index v = 0; v < neighbours.size(); ++v) {
@@ -107,7 +107,7 @@ double median(std::vector<double> numbers) {
   return *middle;
 }
 
-/// Of pairs, with values far beyond the usual ones taken as `outlier` times those.
+/// Robust covariance of values over pairs, with outliers clamped.
 double covariance(const Vector& values, const std::vector<std::pair<std::int32_t, std::int32_t>>& pairs) {
   std::vector<double> sizes;
   sizes.reserve(pairs.size());
@@ -157,7 +157,7 @@ Points without_noise(const TriangleMesh& mesh) {
   std::vector<double> along;
   for (Index v = 0; v < moves.rows(); ++v)
     if (welded.first[v] == v) along.push_back(std::abs(moves.row(v).dot(welded.normals.row(v))));
-  if (!(median(std::move(along)) <= median_move * deviation)) return mesh.vertices;  // it is the shape's own
+  if (!(median(std::move(along)) <= median_move * deviation)) return mesh.vertices;  // details, not noise
   const double diagonal = diagonal_of(mesh.vertices);
   const double share = variance / (variance + std::pow(harmless_noise * diagonal, 2));
   for (Index v = 0; v < moves.rows(); ++v)

@@ -21,10 +21,10 @@ namespace {
 
 using namespace wrap_parameters;
 
-// Tuned: on scans of a body that moves one arm, with and without noise.
+// Tuned on scans of a body that moves one arm, with and without noise.
 
-/// Weight of the mean squared distance between corresponding points, times the option closeness, beside 1 for
-/// ‖∇v − (R − J)‖².
+/// Weight of the mean squared distance between corresponding points, times the option closeness, relative to
+/// that of ‖∇v − (R − J)‖².
 constexpr double sequence_closeness = 150.0;
 /// Weight of the change's ‖∇v‖², times the option bending.
 constexpr double sequence_viscosity = 0.05;
@@ -35,14 +35,14 @@ constexpr Index sequence_coarse_centers = 60;
 constexpr double sequence_centers = 0.5;
 constexpr double sequence_coarse_radius = 3.0;
 constexpr double sequence_fine_radius = 4.0;
-/// Points are held in the last rounds: the weight beside that of correspondences, and the way at which it is
-/// a quarter, in mean distances of the surface to the frame.
+/// Last rounds in which points are held in place: the weight relative to that of correspondences, and the
+/// motion at which it falls to a quarter, in mean distances of the surface to the frame.
 constexpr int held_rounds = 2;
 constexpr double held_weight = 10.0;
 constexpr double held_distance = 2.5;
 
-/// Draws points (n,3) back to where they were, those most that hardly moved: a change that noise explains is
-/// none. `closeness` is the weight of correspondences beside which it stands.
+/// Adds springs from points to their positions `last` (n,3) in the last frame, with weights that fall off
+/// with the motion, so that noise alone does not move them. `closeness` is the weight of correspondences.
 void hold(const WrapTarget& target, const SurfacePoints& now, PointsIn last, double normal_weight,
           double closeness, CorrespondenceTerms& pull) {
   const std::vector<Index> nearest = target.tree.nearest(now.points, now.normals, normal_weight);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A surface that was wrapped onto the first frame of a scanned sequence, and follows the others.
+// Tracking of a surface, wrapped onto the first frame of a scanned sequence, through the other frames.
 #pragma once
 
 #include <memory>
@@ -12,25 +12,25 @@
 
 namespace arapfields {
 
-/// Follows the frames of a sequence, each from where the last one left the surface. Rigidity is measured from
-/// the first frame, so that nothing drifts, and what moves less than the frames' noise is held. The first
-/// field with one more after it is each frame's.
+/// Tracks a surface through the frames of a sequence, each starting from the last one. Rigidity is measured
+/// relative to the first frame, against drift, and points that move less than the frames' noise are held in
+/// place. A frame's field is the first one's followed by one radial field.
 class ARAPFIELDS_EXPORT WrapSequence {
  public:
-  /// `field` is what wrap found for the first frame, from these samples; or what next did, and then the
-  /// sequence goes on behind that frame. Throws InvalidInput for bad options and samples, for others than
-  /// those of that sequence, and for another kind of field.
+  /// `field` is wrap's result for the first frame, from these samples; or next's, to continue after that
+  /// frame. Throws InvalidInput for bad options and samples, for samples of another sequence, and for another
+  /// kind of field.
   WrapSequence(const SurfaceSamples& samples, const DeformationField& field, const WrapOptions& options);
 
   /// Wraps onto the next frame: a function in the coordinates of the first. Throws InvalidInput that names
-  /// `target` where there is no surface; Cancelled, with the sequence as it was. Any thread may call.
+  /// `target` if it has no surface; Cancelled, with the state unchanged. Any thread may call.
   WrapSolution next(const ImplicitFunction& target, const Progress& progress = {});
 
-  /// (m,3) what changes from frame to frame: coefficients of the motion since the first one.
+  /// The state of a frame: coefficients (m,3) of the motion since the first one.
   Points state() const;
-  /// Goes on behind the frame of this state. Throws InvalidInput for one of another sequence.
+  /// Continues after the frame of this state. Throws InvalidInput for one of another sequence.
   void set_state(PointsIn state);
-  /// From rest to the frame of the state.
+  /// The field from rest to the frame of the state.
   std::shared_ptr<DeformationField> field() const;
 
  private:
@@ -40,7 +40,7 @@ class ARAPFIELDS_EXPORT WrapSequence {
   WrapOptions options_;
   std::vector<FieldStep> first_;
   Frame frame_;
-  Points kept_;     // rest points of the fields
+  Points kept_;     // rest points that the fields store
   Points points_;   // (n,3) the surface in the first frame
   Points normals_;  // (n,3)
   Vector areas_;    // (n) shares of its area

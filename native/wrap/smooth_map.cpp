@@ -17,23 +17,23 @@
 namespace arapfields {
 namespace {
 
-// Tuned: on keys of shapes with a known map, by the map itself and by wraps. Lengths are shares of the
-// diagonal.
+// Tuned on shape keys of shapes with a known map, by the map itself and by wraps. Lengths are fractions of
+// the diagonal.
 
-/// Points on the surface, of which so many are chosen far from each other.
+/// Random points on the surface, and the farthest-point samples among them.
 constexpr Index candidates = 4000, chosen = 1000;
-/// How little a point weighs.
+/// Smoothing parameter of a surface point.
 constexpr double point_smoothing = 2e-3;
-/// Points beside the surface, where space grows across as the area's square root: they tell what a plane does
-/// not. How far they lie, and how little they weigh.
+/// Points off the surface, on both sides, where space is scaled like the square root of the area: they fix
+/// the map across flat parts. Their number, offset along the normal, and smoothing parameter.
 constexpr Index beside = 250;
 constexpr double offset = 0.03, offset_smoothing = 1.0;
 
-/// Distance from a point's image at which the map counts a quarter.
+/// Error of a point's image at which the map's weight is a quarter.
 constexpr double missed_share = 0.03;
-/// What is beyond J δ, as a share of it, at most.
+/// Largest nonlinear part of a mapped displacement, as a fraction of J δ.
 constexpr double most_beyond = 0.5;
-/// Steps of the fixed point on the way back.
+/// Fixed-point iterations of the inverse map.
 constexpr int back_steps = 4;
 
 Vec3 normal_of(PointsIn vertices, TrianglesIn triangles, Index t) {
@@ -55,7 +55,7 @@ SmoothingSpline::SmoothingSpline(PointsIn centers, const Vector& smoothing, cons
   const Index all = centers.rows(), inner = all - std::min<Index>(4, all);
   if (inner == 0) return;
 
-  // (K + S) w + P a = y with Pᵀ w = 0: definite where w = Q₂ z for the columns Q₂ that P leaves out.
+  // (K + S) w + P a = y with Pᵀ w = 0: definite for w = Q₂ z, with Q₂ an orthonormal basis of P's null space.
   RowMatrix<double> matrix(all, all);
   parallel_for(0, all, 16, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i)
@@ -80,7 +80,7 @@ SmoothMap SmoothingSpline::fit(PointsIn values) const {
     weights.bottomRows(inner) = cholesky_solve<double>(factor_, right.bottomRows(inner));
     right.topRows(plane) -= across_ * weights.bottomRows(inner);
   }
-  // Centers in a plane leave the affine part open across it: the least one counts.
+  // Coplanar centers do not determine the affine part across their plane: the minimum-norm one is taken.
   const Eigen::MatrixXd upper = turn_.matrixQR().topRows(plane).triangularView<Eigen::Upper>();
   SmoothMap map = map_;
   map.affine_ = upper.completeOrthogonalDecomposition().solve(right.topRows(plane));
@@ -173,7 +173,7 @@ DisplacementMap::DisplacementMap(SmoothMap map, PointsIn points, PointsIn images
   }
 }
 
-/// Of some points, with a displacement each.
+/// The limited nonlinear part f(x + δ) − f(x) − J δ at the points of these rows, with a displacement each.
 Points DisplacementMap::beyond_linear(const std::vector<Index>& rows, PointsIn displacements,
                                       const Progress& progress) const {
   const Points there = map_.at(rows_of(points_, rows) + displacements, progress);

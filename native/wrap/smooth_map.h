@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The smoothest map of space that takes one surface to another.
+// Smoothing splines of space that map one surface to another.
 #pragma once
 
 #include <Eigen/QR>
@@ -20,7 +20,7 @@ class ARAPFIELDS_EXPORT_TO_TESTS SmoothMap {
  private:
   friend class SmoothingSpline;
   using Columns = Eigen::Array<double, Eigen::Dynamic, 3>;
-  /// Calls visit(row, x, ways, distances) for each point: in units, and from the centers.
+  /// Calls visit(row, x, ways, distances) for each point: x in normalised units, and x − c_i with its norms.
   template <class Visit>
   void visit(PointsIn points, const Progress& progress, Visit&& visit) const;
   Points in_units(PointsIn points) const { return (points.rowwise() - center_) / size_; }
@@ -32,13 +32,13 @@ class ARAPFIELDS_EXPORT_TO_TESTS SmoothMap {
   Eigen::Matrix<double, 4, 3> affine_;  // of 1, x, y, z
 };
 
-/// The map that minimises Σ |f(c_i) − y_i|² / s_i + |∇³f|², the last over all of space: what is noise in y,
-/// it leaves out. Source: Duchon 1977, "Splines Minimizing Rotation-Invariant Semi-Norms in Sobolev Spaces";
-/// Wahba 1990, "Spline Models for Observational Data", section 2.4.
+/// The smoothing spline, which minimises Σ |f(c_i) − y_i|² / s_i + ∫ |∇³f|² over all of space. Source: Duchon
+/// 1977, "Splines Minimizing Rotation-Invariant Semi-Norms in Sobolev Spaces"; Wahba 1990, "Spline Models for
+/// Observational Data", section 2.4.
 class ARAPFIELDS_EXPORT_TO_TESTS SmoothingSpline {
  public:
-  /// Distinct centers c (n,3), one at least, and s (n, positive), how little each weighs: in units in which
-  /// the diagonal of the centers' bounding box is 1. Throws Cancelled.
+  /// Distinct centers c (n,3), at least one, and smoothing parameters s (n, positive), in units in which the
+  /// diagonal of the centers' bounding box is 1. Throws Cancelled.
   SmoothingSpline(PointsIn centers, const Vector& smoothing, const Progress& progress = {});
 
   SmoothMap fit(PointsIn values) const;
@@ -50,13 +50,13 @@ class ARAPFIELDS_EXPORT_TO_TESTS SmoothingSpline {
   RowMatrix<double> factor_;  // empty for four centers and fewer
 };
 
-/// Takes the surface of a mesh to where its vertices are at `to` (n,3). A surface's curves and its other side
-/// tell how space grows across it. Throws Cancelled.
+/// A spline that maps a mesh's surface to the one with vertices `to` (n,3). Across the surface space is
+/// scaled like the square root of its area. Throws Cancelled.
 ARAPFIELDS_EXPORT_TO_TESTS SmoothMap surface_map(const TriangleMesh& from, PointsIn to,
                                                  const Progress& progress = {});
 
-/// How a smooth map carries displacements δ of points x (n,3), or back those of their images. Where it misses
-/// a point's own image, as where lips part, the Jacobians that are given count instead.
+/// Maps displacements δ of points x (n,3) by a smooth map, or displacements of their images back. Where the
+/// map does not reproduce a point's image, as between lips that part, the given Jacobians are used instead.
 class ARAPFIELDS_EXPORT_TO_TESTS DisplacementMap {
  public:
   /// Throws Cancelled.
@@ -65,10 +65,10 @@ class ARAPFIELDS_EXPORT_TO_TESTS DisplacementMap {
 
   /// In the direction of the displacements.
   const std::vector<Mat3>& jacobians() const { return jacobians_; }
-  /// From 0 to 1 (n): how much the map counts.
+  /// Weight of the map (n), from 0 to 1, against the given Jacobians.
   const Vector& trust() const { return trust_; }
-  /// J δ, and what f(x + δ) − f(x) has beyond that; of far displacements a part. Back: the δ of which that
-  /// is. Throws Cancelled.
+  /// f(x + δ) − f(x), with the part beyond J δ limited relative to it; `back`: the δ that is mapped to the
+  /// given displacement, by fixed-point iteration. Throws Cancelled.
   Points operator()(PointsIn displacements, const Progress& progress = {}) const;
 
  private:

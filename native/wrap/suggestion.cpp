@@ -21,16 +21,16 @@ namespace {
 
 using namespace wrap_parameters;
 
-/// Nodes of the graph of interior distances, and those from which each one's mean distance is taken.
+/// Nodes of the graph of interior distances, and the sources whose mean distance each node gets.
 constexpr Index most_nodes = 1200, mean_sources = 64;
-/// An end has the largest mean distance within this share of the graph's longest path.
+/// An extremity has the largest mean distance within this fraction of the longest interior distance.
 constexpr double end_reach = 0.12;
-/// Ends of both surfaces that come so near, in shares of the target's diagonal, belong together.
+/// Extremities that the wrap brings within this fraction of the target's diagonal correspond.
 constexpr double same_end = 0.1;
-/// The coarse wrap.
+/// Options of the coarse wrap.
 constexpr int coarse_centers = 200, coarse_stages = 4, coarse_iterations = 4;
 
-/// Places that are far from each other inside a shape, the farthest first, and which are its ends.
+/// Farthest-point samples in interior distance, in the order of their choice, and which are extremities.
 struct FarPlaces {
   Points points, normals;
   std::vector<bool> is_end;
@@ -44,7 +44,7 @@ struct FarPlaces {
     const RowMatrix<double> from = graph.distances(std::min(mean_sources, nodes));
     const Vector means = from.rowwise().mean();
     const double reach = end_reach * from.maxCoeff();
-    Vector nearest = means;  // the first is the farthest on average
+    Vector nearest = means;  // the first sample has the largest mean distance
     std::vector<Index> rows;
     for (Index k = 0; k < std::min(count, nodes); ++k) {
       Index row = 0;
@@ -95,7 +95,7 @@ std::vector<Landmark> suggest_landmarks(const SurfaceSamples& samples, const Imp
   flow.run(options, progress.part(0.4, 0.9), {}, coarse_sliding);
   const Points moved = placement.of(flow.landmarks());
 
-  // Where they land, or the target's end beside it.
+  // The images' nearest points of the target, or its extremities next to them.
   const FarPlaces there(target.points, target.normals, 2 * count, progress);
   const std::vector<Index> landed =
       target.tree.nearest(moved, here.normals * placement.rotation.transpose(), 0.0);

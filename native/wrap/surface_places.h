@@ -9,11 +9,11 @@
 
 namespace arapfields {
 
-/// Where points (n) lie on a mesh.
+/// Points (n) on a mesh, by triangles and barycentric coordinates.
 struct SurfacePlaces {
   std::vector<std::int32_t> triangles;  ///< (n)
-  Points shares;                        ///< (n,3) of the triangle's corners: ≥ 0, of sum one
-  Vector distances;                     ///< (n) from the points, in mesh units
+  Points shares;                        ///< (n,3) barycentric coordinates, ≥ 0
+  Vector distances;                     ///< (n) from the query points, in mesh units
 
   /// Values of the mesh's vertices at point i, interpolated linearly: at(v) is that of vertex v.
   template <class At>
@@ -23,8 +23,8 @@ struct SurfacePlaces {
   }
 };
 
-/// The nearest place of a mesh for each point (n,3), on a side that faces as the point's normal (n,3) does
-/// where there is one nearby: thin parts have two sides. A normal of length 0 takes either side.
+/// The point of a mesh closest to each point (n,3), preferably on a side whose normal agrees with the point's
+/// normal (n,3), since thin parts have two sides. A normal of length 0 takes either side.
 SurfacePlaces places_on(const TriangleMesh& mesh, PointsIn points, PointsIn normals,
                         const Progress& progress = {});
 

@@ -103,7 +103,7 @@ double mean_spacing(PointsIn points) {
     squares[i] = squares.maxCoeff();
     sum += std::sqrt(squares.minCoeff());
   }
-  return 2.0 * sum / static_cast<double>(taken);  // of random points the nearest lies half a spacing away
+  return 2.0 * sum / static_cast<double>(taken);  // random points' nearest neighbour is half a spacing away
 }
 
 WrapTarget wrap_target(const ImplicitFunction& function, Index count, std::uint64_t seed,

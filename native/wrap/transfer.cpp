@@ -19,11 +19,11 @@
 namespace arapfields {
 namespace {
 
-/// Shares of the diagonal of the mesh's bounding box: the distance that a turn by one radian counts as, and
-/// how far a place that faces the right way may lie. Wraps come much nearer; normals of scans may be wrong.
+/// Fractions of the bounding box's diagonal: the distance that a difference of unit normals of 1 counts as,
+/// and the largest distance of a point with a matching normal. Wraps are much nearer; scans' normals may err.
 constexpr double turn_share = 0.1, thin_share = 0.01;
 
-/// Edges of a triangle from its first corner, and its normal times twice its area.
+/// The edges of a triangle from its first corner, and its normal times twice its area.
 struct TriangleEdges {
   TriangleEdges(PointsIn vertices, TrianglesIn triangles, Index t)
       : origin(vertices.row(triangles(t, 0))),
@@ -31,7 +31,7 @@ struct TriangleEdges {
         second(vertices.row(triangles(t, 2)).transpose() - origin),
         area(first.cross(second)) {}
 
-  /// Shares of the corners in the nearest point of the triangle (Ericson 2004, section 5.1.5).
+  /// Barycentric coordinates of the triangle's closest point (Ericson 2004, section 5.1.5).
   Vec3 nearest(const Vec3& point) const {
     const Vec3 a = point - origin, b = a - first, c = a - second;
     const double d1 = first.dot(a), d2 = second.dot(a), d3 = first.dot(b), d4 = second.dot(b);
@@ -62,7 +62,7 @@ struct TriangleEdges {
   Vec3 origin, first, second, area;
 };
 
-/// The triangles about each vertex, vertices at one position taken as one.
+/// The triangles around each vertex, with vertices welded by position.
 class Surroundings {
  public:
   explicit Surroundings(const TriangleMesh& mesh)
@@ -92,7 +92,7 @@ RowMatrix<double> values_at(const SurfacePlaces& places, const Triangles& triang
   return result;
 }
 
-/// At the receiving vertices: on the way there these are at places on the source.
+/// The displacement map at the receiving vertices, whose places lie on the source.
 DisplacementMap displacement_map(const WrappedMesh& source, const SurfacePlaces& places, bool back,
                                  const Progress& progress) {
   SmoothMap map = surface_map(source.rest, source.moved.vertices, progress);
@@ -125,7 +125,7 @@ SurfacePlaces places_on(const TriangleMesh& mesh, PointsIn points, PointsIn norm
   SurfacePlaces places{std::move(closest.triangles), Points(count, 3), std::move(closest.distances)};
   const auto edges_of = [&](Index t) { return TriangleEdges(mesh.vertices, mesh.triangles, t); };
 
-  // The other side of thin parts: the triangle nearest in place and direction, then the best about it.
+  // The other side of thin parts: the nearest triangle by position and normal, then the best around it.
   std::vector<Index> doubtful;
   for (Index i = 0; i < count; ++i)
     if (edges_of(places.triangles[i]).area.dot(normals.row(i)) < 0.0) doubtful.push_back(i);
@@ -195,7 +195,7 @@ WrappedMesh::WrappedMesh(const TriangleMesh& source, PointsIn positions)
   for (std::size_t v = 0; v < areas.size(); ++v) jacobians[v] = jacobians[first[v]];
 }
 
-/// Prepared by the first call that needs it.
+/// The factored system of displacements(), made at its first call.
 struct Correspondence::Motion {
   Motion(const WrappedMesh& wrapped, bool is_back) : source(wrapped), back(is_back) {}
 

@@ -23,8 +23,8 @@ constexpr Index block_size = 16;
 
 using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-/// What a block of 16 neighbouring points contributes to the normal equations, in terms of the basis
-/// functions whose support it meets.
+/// The contribution of a block of 16 neighbouring points to the normal equations, for the basis functions
+/// whose support it meets.
 template <typename Scalar>
 struct PointBlock {
   using Matrix = RowMatrix<Scalar>;
@@ -198,7 +198,7 @@ RowMatrix<double> solution_of(const RadialBasis& basis, const MotionStiffness& s
 RowMatrix<double> solve_velocity(const RadialBasis& basis, const MotionStiffness& stiffness,
                                  const CorrespondenceTerms& correspondences, const LandmarkTerm& landmarks,
                                  const Progress& progress) {
-  // Points that are held weigh more beside stiffness than single precision resolves.
+  // The weights of held points, relative to stiffness, exceed what single precision resolves.
   return stiffness.at_rest ? solution_of<double>(basis, stiffness, correspondences, landmarks, progress)
                            : solution_of<float>(basis, stiffness, correspondences, landmarks, progress);
 }

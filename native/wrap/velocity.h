@@ -7,10 +7,10 @@
 
 namespace arapfields {
 
-/// The stiffness of a surface in motion: what its velocity v is measured against at n points.
+/// The stiffness terms of a moving surface: quadratic energies of its velocity v at n points.
 struct MotionStiffness {
   Points points;                ///< (n,3) current positions
-  RowMatrix<double> jacobians;  ///< (n,9), row-major: J of the motion from rest until now
+  RowMatrix<double> jacobians;  ///< (n,9), row-major: J of the motion since rest
   Vector rigidity;              ///< (n) weights of ‖∇v J − (R − J)‖², R the rotation closest to J
   Vector viscosity;             ///< (n) weights of ‖∇v‖²
   double ridge = 0.0;           ///< weight of the squared coefficients

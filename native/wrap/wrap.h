@@ -21,14 +21,14 @@ struct Landmark {
   Vec3 rest, target;
 };
 
-/// Distances, distortion and warnings of a wrap. Distances between surfaces are shares of the diagonal of the
-/// target's bounding box.
+/// Distances, distortion and warnings of a wrap. Distances between surfaces are fractions of the diagonal of
+/// the target's bounding box.
 struct WrapReport {
   ArapValue arap;  ///< without the alignment's scale
   Distortion distortion;
   double to_target_mean = 0.0, to_target_95 = 0.0;      ///< from the wrapped surface to the target
   double from_target_mean = 0.0, from_target_95 = 0.0;  ///< from the target to the wrapped surface
-  double matched_share = 1.0;     ///< share of the surface that has a counterpart on an open target
+  double matched_share = 1.0;     ///< fraction of the area that has a counterpart on an open target
   double diagonal = 0.0;          ///< in mesh units
   double scale = 1.0;             ///< of the alignment
   std::vector<double> landmarks;  ///< each one's distance to its target, in mesh units
