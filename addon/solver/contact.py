@@ -138,7 +138,7 @@ def is_shown(item):
 def entry_refusal(source, entry):
     """Why a row of the list is not in the way, or cannot be, as a UserError; else None."""
     if entry.group is not None:
-        return None
+        return refusal_of_group(source, entry.group)
     if entry.item is None or not in_scene(entry.item):
         return UserError("{name} is in no scene any more", entry) if entry.name else None
     if entry.item == source:
@@ -150,6 +150,17 @@ def entry_refusal(source, entry):
     if not is_shown(entry.item):
         return UserError("{name} is hidden, so that it is not in the way", entry.item)
     return None
+
+
+def refusal_of_group(source, group):
+    """Why a collection, or something in it, is not in the way, as a UserError; else None."""
+    shown = [item for item in group.all_objects if is_shown(item)]
+    if instance := next((item for item in shown if item.is_instancer and item.type == "EMPTY"), None):
+        return UserError("{name} is an instance; make it real to have it in the way", instance)
+    in_way = {item for item, _ in obstacles_of(source)}
+    if not in_way.isdisjoint(shown):
+        return None
+    return UserError("{name} has no visible mesh that is in the way", group)
 
 
 def refusal(source):
