@@ -223,7 +223,8 @@ int TricubicSurrogate::settled_sign(Index cell, const Vec3& point) const {
   return result;
 }
 
-/// Sets each active cell's error: error_safety times the largest residual at its and 26 neighbours' centres.
+/// Sets the active cells' errors by the residuals at their and their 26 neighbours' centres and the
+/// roughness.
 void TricubicSurrogate::measure_errors() {
   const auto count = static_cast<Index>(active_.size());
   error_.assign(side_.size(), 0.0f);

@@ -57,8 +57,7 @@ ExamplePose ExamplePoses::draw(Random& random, const Vector& activity, const Pro
   ExamplePose pose;
   for (Index b = 0; b < rig_.skeleton.count(); ++b) {
     const Bone& bone = rig_.skeleton.bone(b);
-    const Mat3 rotation =
-        random_rotation(bone, random);  // always drawn: the stream is independent of activity
+    const Mat3 rotation = random_rotation(bone, random);  // drawn for each, whether it is used or not
     const bool turns = bone.parent >= 0 && random.uniform() < activity[b];
     pose.rotations.push_back(turns ? rotation : Mat3::Identity());
   }

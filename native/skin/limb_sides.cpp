@@ -24,9 +24,8 @@ constexpr double facing_end = 0.5;
 
 /// A chain or tree of bones on one side.
 struct Limb {
-  Vec3 along = Vec3::Zero();  ///< unit vector within the symmetry plane, towards the farthest end
-  double parting =
-      -infinity;  ///< coordinate along it where the limb separates from its twin; −infinity: none
+  Vec3 along = Vec3::Zero();   ///< unit vector within the symmetry plane, towards the farthest end
+  double parting = -infinity;  ///< where along it the limb separates from its twin; −infinity: nowhere
 };
 
 /// The root bone of each bone's limb.

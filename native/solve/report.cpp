@@ -111,7 +111,7 @@ Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples
                      const WrapObjective& wrap) {
   field->set_frame(samples.frame);
   field->set_rest_points(samples.points.topRows(std::min(samples.size(), kept_rest_points)));
-  if (options.steps > 1) {  // smaller batches, whose noise several steps average out
+  if (options.steps > 1) {  // many steps with smaller batches converge faster than fewer with full ones
     terms.batch = (2 * terms.batch + 2) / 3;
     terms.fresh = (2 * terms.fresh + 2) / 3;
     terms.pull.handle_batch = (terms.pull.handle_batch + 3) / 4;

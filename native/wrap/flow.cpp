@@ -18,7 +18,8 @@ namespace arapfields {
 namespace {
 
 using namespace wrap_parameters;
-// Tuned on pairs with a known map, such that unlike shapes come as near to their targets as without it.
+// Tuned on pairs with a known map, such that unlike shapes come as near to their targets as without
+// smoothing.
 
 /// Weight in the last stage of tangential distances to the smoothing spline through the surface's current
 /// places (SmoothingSpline), relative to correspondences: it removes tangential noise.

@@ -55,7 +55,7 @@ SmoothingSpline::SmoothingSpline(PointsIn centers, const Vector& smoothing, cons
   const Index all = centers.rows(), inner = all - std::min<Index>(4, all);
   if (inner == 0) return;
 
-  // (K + S) w + P a = y with Pᵀ w = 0: definite for w = Q₂ z, with Q₂ an orthonormal basis of P's null space.
+  // (K + S) w + P a = y with Pᵀ w = 0: definite for w = Q₂ z, Q₂ an orthonormal basis of Pᵀ's null space.
   RowMatrix<double> matrix(all, all);
   parallel_for(0, all, 16, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i)

@@ -146,7 +146,7 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
         {state_.problem.options.iterations, motion_tolerance, share * state_.report.kinetic + motion_floor},
         progress);
   }
-  // A step with active contact is left to backward Euler, whose impacts are inelastic.
+  // A step with active contact, or not converged, is left to backward Euler, which dissipates energy.
   if (scheme != TimeScheme::backward_euler() && (would_press(state_) || !state_.report.converged)) {
     coefficients = q;
     state_.set_measurements(state_.fast, u);
