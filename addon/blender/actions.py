@@ -32,6 +32,13 @@ def remove_curves(owner, is_removed):
             bpy.data.actions.remove(action)
 
 
+def own_action(owner):
+    """Gives a copy an action of its own, where it has one."""
+    data = owner.animation_data
+    if data is not None and data.action is not None:
+        data.action = data.action.copy()
+
+
 def has_keys(item, path):
     """Whether an object's own action moves properties whose path begins like that."""
     data = item.animation_data

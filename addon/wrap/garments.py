@@ -5,6 +5,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..blender import mesh_arrays, modifier_stack
+from ..blender.actions import own_action, remove_curves
 from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import in_scene, settings_of
 from ..carried import refusals
@@ -20,6 +21,8 @@ from ..field_modifier import motion
 from ..handles.empties import matrix_of
 from ..names import COPY_OF
 from . import rigs
+
+PLACING = ("location", "rotation_", "scale", "delta_")  # channels of where the copied object was
 
 
 def copies(context, source, target, given, own):
@@ -111,6 +114,8 @@ def copy_of(item, target, posing):
         motion.discard(copied)
     copied.name, copied[COPY_OF] = f"{item.name} {target.name}", item.name
     settings_of(copied).carried_by = None
+    own_action(copied)
+    remove_curves(copied, lambda one: one.data_path.startswith(PLACING))
     for home in target.users_collection:
         home.objects.link(copied)
     return copied

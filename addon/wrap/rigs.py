@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..blender.actions import own_action
 from ..blender.object_references import settings_of
 
 
@@ -29,6 +30,7 @@ def copied(rig, target):
     own = rig.copy()
     own.data = rig.data.copy()
     own.name = f"{rig.name} {target.name}"
+    own_action(own)
     settings_of(own).rest_bones = ""  # its bones were nowhere else
     for home in target.users_collection:
         home.objects.link(own)

@@ -12,6 +12,8 @@ if IN_BLENDER:
     from support.blender.character import link
     from support.blender.stages import all_said
 
+    from addon.blender.actions import curves_of
+
 pytestmark = pytest.mark.in_blender
 
 
@@ -103,3 +105,33 @@ def test_what_a_constraint_ties_to_a_fitted_armature_is_not_moved_twice(way):
     assert bpy.ops.arapfields.transfer() == {"FINISHED"}
     assert "Carried Objects: 1, Eye follows the armature by a constraint" in all_said()
     assert list(copies()) == ["Other"]
+
+
+def test_copies_have_actions_of_their_own_that_do_not_put_them_back():
+    item, rig = wraps.rigged_bar()
+    item.arapfields.wrap.onto = wraps.soup_of(item)
+    eye = ball("Eye", (0.6, -0.3, 0.1))
+    eye["blink"] = 0.0
+    bone = rig.pose.bones["Upper"]
+    bone.rotation_mode = "XYZ"
+    for frame, turn in ((1, 0.0), (5, 0.4)):
+        eye["blink"], bone.rotation_euler.x = turn, turn
+        eye.keyframe_insert("location", frame=frame)
+        eye.keyframe_insert('["blink"]', frame=frame)
+        bone.keyframe_insert("rotation_euler", frame=frame)
+    scenes.activate(eye, item)
+    bpy.ops.arapfields.carry(way="RIGID")
+    assert bpy.ops.arapfields.wrap(**wraps.SMALL) == {"FINISHED"}
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+    twin, copied = bpy.data.objects["Rig Soup"], copies()["Eye"]
+    place = places(copies())["Eye"]
+    bpy.context.scene.frame_set(5)
+    assert np.abs(places(copies())["Eye"] - place).max() < 1e-5
+    assert copied["blink"] == pytest.approx(0.4) and eye["blink"] == pytest.approx(0.4)
+    assert twin.pose.bones["Upper"].rotation_euler.x == pytest.approx(0.4)
+    twin.pose.bones["Upper"].rotation_euler.x = 1.0
+    twin.pose.bones["Upper"].keyframe_insert("rotation_euler", frame=5)
+    bpy.context.scene.frame_set(1)
+    bpy.context.scene.frame_set(5)
+    assert bone.rotation_euler.x == pytest.approx(0.4)
+    assert "location" in [one.data_path for one in curves_of(eye.animation_data.action)]
