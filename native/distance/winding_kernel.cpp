@@ -53,7 +53,7 @@ inline void add_half_angles(const TrianglePacket& t, const double* p, double* su
   }
 }
 
-/// Adds the multipole field of every child that is far enough, and what it may lack; marks those children.
+/// Adds the multipole field of every child that is far enough, and its remainder; marks those children.
 inline void add_far_fields(const NodeMoments& m, const float* q, float opening_squared, double* sums,
                            float* remainders, std::int32_t* is_far) {
   for (int i = 0; i < W; ++i) {

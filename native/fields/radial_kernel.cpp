@@ -121,8 +121,8 @@ void forward(const RadialBlock<Scalar>& block, const Scalar* coefficients, Scala
   }
 }
 
-/// Cotangents of one component of f at some lanes, as factors of what depends on a center: φ, φ' times d, 1
-/// and q, φ'' times the products of the half gradient.
+/// Cotangents of one component of f at some lanes, collected as coefficients of the terms that depend on a
+/// center: φ, φ' times d, 1 and q, φ'' times the products of the half gradient.
 template <int order, bool embedded, class Scalar>
 struct CenterCotangents {
   Pack<Scalar> value, d[3], one, q[3], products[6];

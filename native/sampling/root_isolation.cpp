@@ -155,7 +155,7 @@ void scan(const TricubicSurrogate& model, const Line& line, Index index, Run& ru
           ScanResult& out) {
   const double sliver = sliver_in_spacings * model.spacing();
   int before = 0;
-  double start = 0.0;  // of what is not yet in the run
+  double start = 0.0;  // parameter up to which the line is scanned
   run.clear();
   const auto finish = [&](int after) {
     if (!run.error.empty()) classify(run, index, before, after, out, kinds);

@@ -97,7 +97,7 @@ class RadialObjective final : public MeasuredObjectiveOf<Scalar> {
   double barrier() const {
     return std::max(problem_.options.surface.barrier, contact_.size() > 0 ? contact_barrier : 0.0);
   }
-  static constexpr double contact_barrier = 10.0;  ///< least weight of the fold barrier in contact
+  static constexpr double contact_barrier = 10.0;  ///< least fold barrier while handles pull into contact
 
   const RadialProblem& problem_;
   RadialEvaluator<Scalar> samples_;

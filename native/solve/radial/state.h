@@ -95,8 +95,8 @@ struct RadialState {
   Dependent<Vector, 1> pin_widths;            ///< width of the shape at each point handle
   Dependent<std::vector<Index>, 1> mirrored;  ///< with symmetry, the sample nearest to each one's reflection
   struct Tried {
-    Points targets;                  ///< the handles'
-    RowMatrix<double> coefficients;  ///< of what they made
+    Points targets;                  ///< of the handles
+    RowMatrix<double> coefficients;  ///< the solution
   } tried;                           ///< last trial of ContactSolve::comes_apart()
   bool in_one_go = false;            ///< handles jump to their targets, unlike in a drag
   RadialHooks hooks;
