@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 
 from ..blender import mesh_arrays, modifier_stack
+from ..blender.language import translated
 from ..blender.property_definitions import path_text
 from ..core.errors import UserError
 from ..core.geometry.spaces import facing, transform
@@ -86,7 +87,7 @@ class ARAPFIELDS_OT_wrap_sheet(JobOperator, bpy.types.Operator):
             try:
                 path.write_text(page, encoding="utf-8")
             except OSError as error:
-                self.add_message("ERROR", str(error))
+                self.add_message("ERROR", translated("{path}: {error}", path=path, error=error.strerror))
                 return {"CANCELLED"}
             self.add_message("INFO", str(path))
         return result
