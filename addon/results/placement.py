@@ -107,8 +107,9 @@ def place_result(context, source, kind, output, result, moved, before):
     return source
 
 
-def holds_place(source):
-    """Whether its place in the world is not its own to change: something else sets it, or refers to it."""
+def holds_place(source, target):
+    """Whether its place in the world is not its own to change: something else sets it or refers to it, or
+    the target of its wrap goes along."""
     settings, data = settings_of(source), source.animation_data
     bound = source.constraints or settings.carried or empties.used(source)
     posed = any(modifier.type == "ARMATURE" for modifier in source.modifiers)
@@ -117,7 +118,14 @@ def holds_place(source):
     sheared = parent is not None and not np.array_equal(
         space_of(parent.matrix_world).local_to_solve, np.eye(4)
     )
-    return bool(bound or posed or moved or sheared)
+    return bool(bound or posed or moved or sheared or hangs_on(target, source))
+
+
+def hangs_on(item, other):
+    """Whether an object is a child of another, or a child's child."""
+    while item is not None and item.parent != other:
+        item = item.parent
+    return item is not None
 
 
 def put(context, item, place):

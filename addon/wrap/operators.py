@@ -100,7 +100,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
                 tracker.warnings += fitting.warnings
             return field
 
-        places = effective_value("move_object", settings.wrap, self) and not holds_place(source)
+        places = effective_value("move_object", settings.wrap, self) and not holds_place(source, other)
         item = plan_solve_job(context, self, source, "WRAP", values["samples"], values["seed"], solve, places)
         return self.with_rest(item, marks, wrapped, fitting, below, Followers(context, source))
 

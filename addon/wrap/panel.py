@@ -50,7 +50,7 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
         settings_column(layout, wrap, WRAP, advanced=False)
         if rest_bones.armatures_of(source):
             draw_settings(layout, wrap, "fit_rig")
-        if not holds_place(source):
+        if not holds_place(source, wrap.onto):
             draw_settings(layout, wrap, "move_object")
         job_button(layout, Op.WRAP, "MOD_SHRINKWRAP")
         factor_slider(layout, source)

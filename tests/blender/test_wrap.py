@@ -15,7 +15,7 @@ if IN_BLENDER:
     from support.blender.character import seen_mesh
     from support.blender.wraps import SMALL, bar_and_target, joints, rigged_bar, soup_of
 
-    from addon.blender import modifier_stack
+    from addon.blender import mesh_arrays, modifier_stack
     from addon.core.geometry.spaces import space_of
     from addon.core.runtime import jobs
     from addon.field_modifier import inputs
@@ -59,6 +59,19 @@ def test_the_object_stays_where_asked_and_where_pins_hold_it():
         bpy.context.view_layer.update()
         assert np.array_equal(scenes.world_points(item), rest)
         inputs.put(modifier_stack.find(item), "Factor", 1.0)
+
+
+def test_a_target_that_is_a_child_of_the_object_stays_where_it_is():
+    item, target = bar_and_target()
+    target.parent, target.matrix_parent_inverse = item, item.matrix_world.inverted()
+    bpy.context.view_layer.update()
+    goal = scenes.world_points(target)
+    scenes.activate(item)
+    for _ in range(2):
+        assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+        assert np.array_equal(scenes.world_points(target), goal)
+        away = af.MeshSdf(goal, mesh_arrays.triangles(target.data))(scenes.world_points(item))
+        assert np.abs(away).mean() < 0.02 * np.ptp(goal, axis=0).max()
 
 
 def test_landmarks_are_pairs_of_empties_that_move_with_both():
