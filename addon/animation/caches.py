@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 
 from ..blender.language import translated
-from ..core.errors import UserError
+from ..core.errors import UserError, as_user_error
 from ..core.runtime.coroutines import Pause
 from ..field_modifier import cache_modifier
 from ..results import result_objects
@@ -90,7 +90,7 @@ class CacheFile:
         try:
             self._writer.commit()
         except OSError as error:
-            raise UserError("{error}", error=error) from error
+            raise as_user_error(error) from error
 
     def discard(self):
         """Removes what is not in its place; the cache of an earlier bake stays as it is."""

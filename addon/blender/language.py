@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..core.errors import UserError
+from ..core.errors import UserError, as_user_error
 from ..names import CONTEXT
 
 _lookup = getattr(bpy.app.translations, "pgettext_rpt", bpy.app.translations.pgettext_iface)
@@ -14,7 +14,7 @@ def translated(message, **values):
     if isinstance(message, UserError):
         message, values = message.template, message.values
     elif isinstance(message, Exception):
-        return str(message)
+        return str(as_user_error(message))
     text = _lookup(message, CONTEXT)
     quoted = {key: translated(each) for key, each in values.items() if isinstance(each, Exception)}
     return text.format(**values | quoted) if values else text

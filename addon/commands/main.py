@@ -7,7 +7,7 @@ import importlib
 import signal
 import sys
 
-from ..core.errors import UserError
+from ..core.errors import UserError, as_user_error
 from ..core.runtime import native
 from .launch import Launch, end_with_parent
 from .parser import parse
@@ -32,7 +32,7 @@ def run(arguments, script=None):
             return fail("interrupted", 130)
         except (UserError, OSError, ValueError) as error:
             full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
-            return fail(error, 1 if full else 2)
+            return fail(as_user_error(error), 1 if full else 2)
 
 
 def verb(name):

@@ -23,8 +23,12 @@ class UserError(Exception):
 
 
 def as_user_error(error):
-    """The same as a UserError."""
-    return error if isinstance(error, UserError) else UserError("{error}", error=error)
+    """The same as a UserError; a system's refusal by path and reason, without its number."""
+    if isinstance(error, UserError):
+        return error
+    if isinstance(error, OSError) and error.filename is not None:
+        return UserError("{path}: {error}", path=error.filename, error=error.strerror)
+    return UserError("{error}", error=error)
 
 
 def refuse(reason):
