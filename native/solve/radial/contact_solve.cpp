@@ -12,6 +12,8 @@ namespace {
 
 /// Most iterations of comes_apart()'s solve without contact.
 constexpr Index steps_apart = 60;
+/// Most solves of pushes_apart() after a leap: the first one often leaves parts a little in each other.
+constexpr int most_solves_apart = 3;
 /// Relative decrease of the energy with which its solution replaces the current one.
 constexpr double better = 0.01;
 
@@ -82,7 +84,7 @@ void ContactSolve::follow() {
     const RowMatrix<double> start = s.shape.coefficients;
     if (ends_clear()) return;
     const bool parts_overlap = s.contact.deepest_outside() <= 0.0;
-    if (parts_overlap && pushes_apart()) return;
+    if (parts_overlap && pushes_apart(leaps ? most_solves_apart : 1)) return;
     slowly = slowly || (parts_overlap && s.in_one_go);
     go_back(start);
   }
@@ -173,12 +175,17 @@ bool ContactSolve::ends_clear() {
   return true;
 }
 
-/// Separates parts that overlap after a solve without contact. Returns whether that succeeds.
-bool ContactSolve::pushes_apart() {
-  steps_.approach_at_once(motions_);
-  if (state_.contact.overlaps(state_.shape.coefficients)) return false;
-  report_contact(state_);
-  return true;
+/// Separates parts that overlap after a solve without contact, by so many solves in contact at most, while
+/// the constraints that were found are violated. Returns whether that succeeds.
+bool ContactSolve::pushes_apart(int most_solves) {
+  bool apart = false;
+  for (int solve = 0; solve < most_solves && !apart; ++solve) {
+    if (solve > 0 && state_.contact.deepest() <= ContactSet::deep) return false;
+    steps_.approach_at_once(motions_);
+    apart = !state_.contact.overlaps(state_.shape.coefficients);
+  }
+  if (apart) report_contact(state_);
+  return apart;
 }
 
 /// Continuation in usual steps; `slowly`: in small steps as well, and the better of both results is kept.

@@ -27,7 +27,7 @@ class ContactSolve {
   bool starts_better(const RowMatrix<double>& coefficients);
   bool may_be_clear() const;
   bool ends_clear();
-  bool pushes_apart();
+  bool pushes_apart(int most_solves);
   void approach(bool slowly);
   void approach_again_slowly(const RowMatrix<double>& start);
   void go_back(const RowMatrix<double>& coefficients);

@@ -19,10 +19,12 @@ constexpr int steps_at_once = 10;
 /// A deformation has converged if `steps_at_once` iterations reduce the energy by less than this fraction.
 /// Thin parts under many held samples would take hundreds of iterations more for a gain of 1e-4.
 constexpr double least_gain = 1e-3;
-/// It continues while they reduce the penetration depth to less than this fraction.
-constexpr double still_comes_out = 0.8;
-/// Increases of the energy that do not end it: contact planes that become active raise the energy.
-constexpr int most_rises = 6;
+/// In contact it continues while they reduce the penetration depth, or the distance of handles that are held
+/// back, to less than these fractions.
+constexpr double still_comes_out = 0.8, still_slides = 0.98;
+/// Increases of the energy that do not end it (contact planes that become active raise the energy), and
+/// checks at which the depth is above the tolerance without having fallen.
+constexpr int most_rises = 6, most_stays = 3;
 /// Factor on least_gain while contact holds handles back, which would slide slowly for many iterations.
 constexpr double less_where_held = 10.0;
 /// A deformation with at least `worth_a_first` centers starts from a solve with half of them, `most_first` at
@@ -75,6 +77,36 @@ struct Bounds {
   double least_gain = 0.0;  ///< least relative decrease in `steps_at_once` iterations
 };
 
+/// Decides after each `steps_at_once` iterations whether more of them are worth it.
+class Convergence {
+ public:
+  Convergence(double least, bool contact) : least_gain_(least), contact_(contact) {}
+  bool continues(const RadialReport& report, int iterations) {
+    const ContactReport& contact = report.contact;
+    double held = 0.0;
+    for (const HeldBack& handle : contact.held) held += handle.distance;
+    const double gain = value_ - report.value;
+    const double least = (contact.held.empty() ? 1.0 : less_where_held) * least_gain_ * report.value;
+    const bool gains = report.iterations >= iterations && gain >= least;
+    const bool slides = held < still_slides * held_;
+    const bool rises = contact_ && gain <= -least && rises_++ < most_rises;
+    const bool comes_out = contact.deepest < still_comes_out * deepest_;
+    value_ = report.value;
+    deepest_ = contact.deepest;
+    held_ = held;
+    return gains || slides || rises || (contact.unsettled && (comes_out || stays_++ < most_stays));
+  }
+
+ private:
+  double least_gain_;
+  bool contact_;
+  double value_ = std::numeric_limits<double>::infinity();
+  double deepest_ = value_;
+  double held_ = 0.0;  // sum of the distances of handles that are held back
+  int rises_ = 0;
+  int stays_ = 0;
+};
+
 /// Solves until convergence, until the iterations or the time budget run out, or until the observer ends it.
 /// The solver's energy is the loss divided by `rigidity`.
 LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& progress,
@@ -84,8 +116,7 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
   LoopResult result;
   Iteration iteration;
   bool ended = false;
-  int rose = 0;
-  double before = std::numeric_limits<double>::infinity(), deepest = before;
+  Convergence convergence(bounds.least_gain, hooks.contact.has_value());
   RadialHooks steps{hooks.energies, 1.0 / rigidity, {}};
   if (hooks.observer)
     steps.observer = [&](const std::vector<LossTerm>& terms) {
@@ -111,13 +142,7 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
       result.stopped_by = StopReason::observer;
       break;
     }
-    const ContactReport& contact = live.report().contact;
-    const double least = (contact.held.empty() ? 1.0 : less_where_held) * bounds.least_gain;
-    const bool rises = hooks.contact && value - before >= least * value && rose++ < most_rises;
-    const bool gains = live.report().iterations >= at_once && before - value >= least * value;
-    if (!gains && !rises && !(contact.unsettled && contact.deepest < still_comes_out * deepest)) break;
-    before = value;
-    deepest = contact.deepest;
+    if (!convergence.continues(live.report(), at_once)) break;
     if (how.time_budget > 0.0 && result.seconds > how.time_budget) {
       result.stopped_by = StopReason::time_budget;
       break;
