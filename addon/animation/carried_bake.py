@@ -135,9 +135,12 @@ class CarriedBake:
         self.caches[carried].play_on(item)
 
     def add_object(self, context, carried, item):
-        mesh = result_objects.shown_mesh(context, item, len(self.shapes[carried][0]))
+        mesh = result_objects.shown_mesh(context, item, len(self.shapes[carried][0]), in_place=True)
         report = {"frames": self.frames.count}
         baked = result_objects.show(context, item, "BAKE", "BAKE", mesh, report, select=False)
+        result_objects.copy_modifiers(baked, modifier_stack.behind(item))
+        source = self.carrying.source.get()
+        result_objects.retarget(baked, {source: result_objects.existing(context, source, "BAKE", "BAKE")})
         yield from self.add_frames(carried, baked)
         visibility.show_alone(item, baked)
 

@@ -141,6 +141,11 @@ def shown_before(source, in_place):
     return [modifier for modifier in before(source, in_place) if modifier.show_viewport]
 
 
+def behind(source):
+    """The modifiers that act on what the field has moved."""
+    return [one for one in list(source.modifiers)[place(source) :] if not (is_field(one) or is_cache(one))]
+
+
 def keeps_vertices(source):
     """Whether the vertices at the field's place are those of the mesh, by number, shown and rendered."""
     return all(

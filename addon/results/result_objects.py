@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Result objects: made once for a source and kind, updated in place by later runs."""
 
+import contextlib
 import json
 
 import bpy
@@ -145,9 +146,36 @@ def warp_mesh(context, source, before, after):
     return applied
 
 
-def shown_mesh(context, source, count):
-    """A mesh of its own of what is shown of the source: modifiers and shape keys applied."""
-    applied = modifier_stack.mesh_copy(context, source)
+def copy_modifiers(item, given):
+    """Gives a result these modifiers of its source."""
+    item.modifiers.clear()
+    for one in given:
+        made = item.modifiers.new(one.name, one.type)
+        for field in one.bl_rna.properties:
+            if not field.is_readonly:
+                with contextlib.suppress(
+                    TypeError, ValueError, AttributeError
+                ):  # what its kind does not take
+                    setattr(made, field.identifier, getattr(one, field.identifier))
+        if one.type == "NODES":
+            for name in one.keys():  # noqa: SIM118
+                made[name] = one[name]
+
+
+def retarget(item, own):
+    """What the modifiers and constraints of a copy point to, its twin takes the place of."""
+    ends = [*item.modifiers, *item.constraints]
+    ends += [one for constraint in item.constraints for one in getattr(constraint, "targets", ())]
+    for end in ends:
+        for field in end.bl_rna.properties:
+            if field.type == "POINTER" and not field.is_readonly and getattr(end, field.identifier) in own:
+                setattr(end, field.identifier, own[getattr(end, field.identifier)])
+
+
+def shown_mesh(context, source, count, in_place=False):
+    """A mesh of its own of what is shown of the source: modifiers, those before the field's place or all, and
+    shape keys applied."""
+    applied = modifier_stack.mesh_copy(context, source, in_place)
     if len(applied.vertices) != count:
         bpy.data.meshes.remove(applied)
         raise UserError("{name} changed while it was worked on; run again", source)

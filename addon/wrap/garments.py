@@ -20,6 +20,7 @@ from ..core.runtime import native
 from ..field_modifier import motion
 from ..handles.empties import matrix_of
 from ..names import COPY_OF
+from ..results.result_objects import retarget
 from . import rigs
 
 PLACING = ("location", "rotation_", "scale", "delta_")  # channels of where the copied object was
@@ -59,7 +60,7 @@ def copies(context, source, target, given, own):
         made[item] = copy_of(item, target, posing)
         put(context, made[item], target, matrix, shape, posing)
     for copied in made.values():
-        rigs.retarget(copied, twins | made)
+        retarget(copied, twins | made)
     return len(made), notes
 
 

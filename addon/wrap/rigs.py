@@ -60,13 +60,3 @@ def copy_property(given, there, path):
     if name in given and name not in there:
         there[name] = given[name]
         there.id_properties_ui(name).update_from(given.id_properties_ui(name))
-
-
-def retarget(item, own):
-    """What the modifiers and constraints of a copy point to, its twin takes the place of."""
-    ends = [*item.modifiers, *item.constraints]
-    ends += [one for constraint in item.constraints for one in getattr(constraint, "targets", ())]
-    for end in ends:
-        for field in end.bl_rna.properties:
-            if field.type == "POINTER" and not field.is_readonly and getattr(end, field.identifier) in own:
-                setattr(end, field.identifier, own[getattr(end, field.identifier)])

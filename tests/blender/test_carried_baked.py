@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bakes into shape keys of carried meshes that modifiers refine."""
+
+import numpy as np
+import pytest
+from support.blender.inside import IN_BLENDER
+
+if IN_BLENDER:
+    import bpy
+    from support.blender import scenes
+    from support.blender.live import step
+
+pytestmark = pytest.mark.in_blender
+
+
+def test_modifiers_behind_the_field_act_on_the_baked_object_too():
+    bar, _, moving = scenes.bar_with_handles()
+    sleeve = scenes.bar("Sleeve", 0.6)
+    laid = sleeve.modifiers.new("Laid", "SHRINKWRAP")
+    laid.target, laid.wrap_mode, laid.offset = bar, "OUTSIDE", 0.05
+    sleeve.modifiers.new("Finer", "SUBSURF")
+    scenes.activate(sleeve, bar)
+    bpy.ops.arapfields.carry()
+    for frame, height in ((1, 0.0), (3, 0.4)):
+        moving.location.z += height
+        moving.keyframe_insert("location", frame=frame)
+    scenes.activate(bar)
+    bpy.ops.arapfields.live()
+    live = {}
+    for frame in (1, 3):
+        bpy.context.scene.frame_set(frame)
+        step(refined=True)
+        step(refined=True)
+        live[frame] = scenes.world_points(sleeve)
+    bpy.ops.arapfields.live()
+    for _ in range(2):
+        scenes.activate(bar)
+        assert bpy.ops.arapfields.bake(format="KEYS", start=1, end=3) == {"FINISHED"}
+        baked = bpy.data.objects["Sleeve_baked"]
+        assert [one.type for one in baked.modifiers] == ["SHRINKWRAP", "SUBSURF"]
+        for frame, points in live.items():
+            bpy.context.scene.frame_set(frame)
+            bpy.context.view_layer.update()
+            assert np.abs(scenes.world_points(baked) - points).max() < 0.01
