@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a live shape is shown, from one session of a source to the next."""
+"""The display of a live session: the source's field modifier, or an object of its own."""
 
 from typing import Any, NamedTuple
 
@@ -8,17 +8,17 @@ from .live_object import LiveObject
 
 
 class Former(NamedTuple):
-    """What stays of a session that has ended, for one that takes its place."""
+    """What a session that has ended hands over to the one that replaces it."""
 
     uid: int  # session_uid of its source
     display: Any
     carried: dict  # what carried objects had before
     keeps_shape: bool
-    gone: list  # what layers.make_way() has taken away
+    gone: list  # what layers.make_way() has removed
 
 
 def display_of(context, source, surface, earlier):
-    """Where the shape is shown; what an earlier session made is used again, or goes."""
+    """The display of a new session: the earlier session's if both are in place, else a new one."""
     display = earlier.display if earlier else None
     if display is not None and display.in_place and surface.in_place:
         display.bind(context, source)

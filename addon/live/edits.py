@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a live session notices that its source, its handles or what it carries is edited; main thread."""
+"""Detects edits of a live session's source, handles and carried objects; main thread."""
 
 import time
 from typing import NamedTuple
@@ -19,16 +19,16 @@ from ..solver import secondary_motion
 from ..solver.source_reader import SourceChanged, rest_frame, uses_handles
 from ..stiffness import painted
 
-STROKE = 0.3  # seconds without a touch of the brush after which a stroke has ended
+STROKE = 0.3  # seconds without new weights after which a brush stroke counts as ended
 
 
 class Updates(NamedTuple):
-    """What Blender has just updated: data-blocks, and the session_uids of some of them."""
+    """Data-blocks updated by a depsgraph, and the session_uids of some of them."""
 
-    items: list  # objects only where they, or their geometry, have moved
+    items: list  # original data-blocks; objects only with an updated transform or geometry
     meshes: set  # with new geometry
     objects: set  # with new geometry
-    data: set  # all that are no objects
+    data: set  # all data-blocks that are no objects
 
     @classmethod
     def of(cls, depsgraph):
@@ -50,14 +50,14 @@ class Updates(NamedTuple):
 
 
 class EditWatch:
-    """Notes what Blender has updated; the source is compared with what was read when the session looks."""
+    """Records depsgraph updates; `require_unedited` then compares the source with what was read."""
 
     def __init__(self, reader):
         self.reader, self.may_be_edited, self.may_have_moved, self.edited_at = reader, False, False, 0.0
-        self.world = None  # the source's matrix when it was last looked at
+        self.world = None  # the source's world matrix at the last check
 
     def note(self, updates):
-        """Takes what Blender has just updated."""
+        """Records the Updates of a depsgraph."""
         self.reader.carrying.watch(updates.objects, updates.data)
         source = self.reader.reference.find()
         if source is None:
@@ -71,7 +71,7 @@ class EditWatch:
             self.may_have_moved = True
 
     def require_unedited(self, context, source):
-        """SourceChanged where the mesh is another than when it was read; else reads what has only moved."""
+        """Raises SourceChanged if the mesh or its non-uniform scale has changed; else reads moved points."""
         if not is_animated(source) and self.is_stretched(source):
             raise SourceChanged(source.name)
         if self.may_be_edited and not self.is_in_stroke(source):
@@ -84,7 +84,8 @@ class EditWatch:
         self.reader.refresh_carried(context)
 
     def is_stretched(self, source):
-        """Whether it is scaled otherwise than when it was read, not evenly; once it rests, in any digit."""
+        """Whether the non-uniform scale differs from that at reading: exactly, if the matrix equals the last
+        check's; by more than SAME_STRETCH while the source moves."""
         world = matrix_of(source)
         rests, self.world = np.array_equal(world, self.world), world
         now = space_of(world, source.name)
@@ -101,16 +102,16 @@ class EditWatch:
 
 
 def may_move(item, source):
-    """Whether an update of this may move the points of the source before its field does."""
+    """Whether an update of a data-block may move the source's points before its field modifier."""
     if isinstance(item, bpy.types.Object):
         return item == source or (item.type != "EMPTY" or settings_of(item).handle_of != source)
     return isinstance(item, bpy.types.Key | bpy.types.Armature | bpy.types.Lattice | bpy.types.Curve)
 
 
 def layout_of(source, kind, scene):
-    """What a solver is set up for: the handles and their rest regions, and what is shown.
+    """Comparable settings that a solver is set up for: handles with their rest poses, output, modifiers.
 
-    Where it changes, the solver is set up anew. The energy's weights may be animated and are not part of it.
+    After a change, the solver is set up anew. Energy weights are left out, as they may be animated.
     """
     settings = settings_of(source)
     held = [
@@ -130,12 +131,12 @@ def layout_of(source, kind, scene):
 
 
 def differ_in_handles(a, b):
-    """Whether two layouts differ in handles alone, and the solver can take those of `a` as it stands."""
+    """Whether two layouts differ in handles alone, and the solver can take those of `a` as it is."""
     return a[2:] == b[2:] and bool(a[0]) and bool(b[0]) and not any(group for _, _, group, *_ in a[0])
 
 
 def stack_of(source):
-    """The modifiers before the field's, and where its offsets can lie."""
+    """The modifiers before the field's, and whether the mesh has several users."""
     before = modifier_stack.before(source, in_place=True)
     shown = [(modifier.name, modifier.type, modifier.show_viewport) for modifier in before]
     return shown, source.data.users > 1

@@ -13,20 +13,20 @@ from .live_object import LIVE
 
 
 class LiveModifier:
-    """Made at the start, which keeps the motion that the source had before."""
+    """Made when live mode starts; keeps a snapshot of the source's earlier motion."""
 
     in_place = True
 
     def __init__(self, context, source, _):
         self.before, self.shown = motion.snapshot(source), None
-        self.moved_by = settings_of(source).moved_by  # of the motion before
-        self.first = self.before  # where a step before this one is undone to
+        self.moved_by = settings_of(source).moved_by  # the earlier motion's
+        self.first = self.before  # motion of the undo steps before live mode
         self.was_silent = bool(settings_of(source).silenced)
         self.was_playing = cache_modifier.is_playing(source)
         self.bind(context, source)
 
     def bind(self, context, source):
-        """Also when the source has changed: the motion before live mode stays to be restored."""
+        """Binds the modifier, also after an edit of the source; `before` stays as it is."""
         motion.bind(context, source)
         visibility.show_alone(source, source, for_now=True)
 
@@ -35,12 +35,12 @@ class LiveModifier:
         return (*stored.arrays_of(self.before), *stored.arrays_of(self.first))
 
     def require(self, source):
-        """UserError where the user has removed or applied it."""
+        """Raises UserError if the user has removed or applied the modifier."""
         if modifier_stack.find(source) is None:
             raise UserError("The modifier of {name} was removed", source)
 
     def show(self, source, shape):
-        """Moves the source's points to a session's shape; whether it could."""
+        """Writes a Shape as the source's motion; False in Edit and Sculpt Mode."""
         if source.mode in PAUSING:
             return False
         motion.write(source, motion.Motion(shape.points - shape.rest, shape.turns, shape.changes))
@@ -48,7 +48,7 @@ class LiveModifier:
         return True
 
     def take_away(self, source):
-        """Gives the source the motion that it had before, or none."""
+        """Restores the motion from before live mode, if any."""
         if source is not None:
             settings_of(source).live_kind = ""
             stored.put_mark(source, "")
@@ -63,7 +63,8 @@ class LiveModifier:
                     cache_modifier.set_playing(source, True)
 
     def keep(self, context, source, kind):
-        """Leaves the motion where it is, or puts it where the user wants the result; returns the object."""
+        """Keeps the motion in the modifier, or moves it to the mesh or a shape key, by the setting `result`;
+        returns the source."""
         settings = settings_of(source)
         settings.live_kind = ""
         stored.put_mark(source, "")
@@ -76,7 +77,7 @@ class LiveModifier:
         return source
 
     def leave(self, source):
-        """The source is as in a step without live mode; but its mesh may be as live mode left it."""
+        """After undo to a step without live mode: restores `first` if the mesh still has a live shape."""
         if stored.mark(source):
             motion.restore(source, self.first)
             stored.put_mark(source, "")

@@ -8,11 +8,11 @@ from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError
 from ..results import result_objects, visibility
 
-LIVE = "LIVE"  # kind of the result that a live source has
+LIVE = "LIVE"  # kind of a live result in the source's list of results
 
 
 class LiveObject:
-    """Made at the start; the source is out of sight and out of renders meanwhile."""
+    """Made when live mode starts; hides the source in viewports and renders."""
 
     in_place, arrays = False, ()
 
@@ -27,11 +27,11 @@ class LiveObject:
         self.result = ObjectReference(item)
 
     def require(self, source):
-        """UserError where the user has deleted it."""
+        """Raises UserError if the user has deleted the object."""
         self.result.get()
 
     def show(self, source, shape):
-        """Puts a session's shape on the object; whether it could."""
+        """Writes a Shape to the object's mesh; False in Edit Mode, or if its topology is unknown."""
         item = self.result.get()
         if item.mode == "EDIT":
             return False
@@ -43,7 +43,7 @@ class LiveObject:
         return True
 
     def take_away(self, source):
-        """Removes it, also where an undone step left it in no scene; the source, if any, is seen again."""
+        """Removes the object, even if undo has unlinked it from all scenes, and shows the source again."""
         if source is not None:
             forget(source)
         leftover = self.result.find()
@@ -51,7 +51,7 @@ class LiveObject:
             result_objects.discard(leftover)
 
     def keep(self, context, source, kind):
-        """Turns it into an ordinary result of that kind; returns that."""
+        """Replaces the live object by a result of that kind with the same mesh; returns the result."""
         item = self.result.find()
         if item is None:
             raise UserError("{name} has no live result", source)
@@ -64,14 +64,14 @@ class LiveObject:
 
 
 def forget(source):
-    """The source is no longer live: it is seen as before, and lists no live result; returns that, if any."""
+    """Ends the source's live state, restores its visibility; returns its live result's object, or None."""
     settings_of(source).live_kind = ""
     visibility.give_back(source)
     return forget_result(source)
 
 
 def forget_result(source):
-    """Takes the live result off the source's list; returns it, if any."""
+    """Removes the live result from the source's list of results; returns its object, or None."""
     settings, item = settings_of(source), None
     for index in reversed(range(len(settings.results))):
         if settings.results[index].kind == LIVE:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a live session's worker does: a drag's shapes go on from those before, and end in one from rest."""
+"""Solver of a live session's worker: during a drag each solve starts from the last one, then from rest."""
 
 import time
 
@@ -10,14 +10,15 @@ from ..solver.frame_solver import FrameSolver
 from ..solver.setup import sampled
 from .prefetch import prefetch
 
-STEPS, MOST_SHAPES = 3, 60  # quasi-Newton steps to each shape of a request, and how many of these there are
-# A shape is shown once it is that near the one before, as a share of the size: its own last is then at most
-# four times as far. After so many seconds any is shown. A newer request waits for one that is shown.
+STEPS, MOST_SHAPES = 3, 60  # quasi-Newton iterations per shape, and most shapes per request
+# A shape is shown once no point has moved by more than NEAR times the size since the last one: the converged
+# shape is then at most four times as far. After LATEST seconds every shape is shown. A newer request waits
+# until one is shown.
 NEAR, LATEST = 7e-4, 0.2
-TOLERANCE = 3e-5  # what single precision sees; a shape then is within about 0.3 % of the size
-PACE = 1 / 60  # seconds from one shape to the next in secondary motion
-MOST_PACES = 3  # that a step in real time stands for; fewer lengths of steps, fewer preconditioners
-STILL, STILL_STEPS = 1e-3, 20  # of the size a second, so many steps in turn: it has come to rest
+TOLERANCE = 3e-5  # limit of single precision; the last shape is within about 0.3 % of the size
+PACE = 1 / 60  # time step of secondary motion, in seconds
+MOST_PACES = 3  # most time steps that one real-time step merges; each length needs its preconditioner
+STILL, STILL_STEPS = 1e-3, 20  # at rest: below this share of the size per second, for so many steps
 
 
 class LiveSolver:
@@ -26,7 +27,7 @@ class LiveSolver:
     def __init__(self, reader):
         self._reader, self.frame_solver = reader, None
         self.solved_request = None  # the request of the last shape
-        self.is_playing = False  # whether the newest request is a frame's, which another thread solves
+        self.is_playing = False  # whether the newest request is an animation frame, solved by SolvedFrames
         self._stepped_at = None  # when the last step in real time ended; None: the next begins at rest
         self._stepped_motion = None
         self._tracked = None  # (n, 3) the points of the last shape, in solve space
@@ -73,13 +74,13 @@ class LiveSolver:
                 break
 
     def _is_near(self):
-        """Whether the points are near where they were when this was asked before."""
+        """Whether the tracked points have moved by less than NEAR since the last call."""
         before, self._tracked = self._tracked, self.frame_solver.solver.tracked()
         size = np.ptp(self.samples.points, axis=0).max()
         return before is not None and np.abs(self._tracked - before).max() < NEAR * size
 
     def refine(self, request, token):
-        """Yields the request's own shape, from rest; where there is motion, once that has ended."""
+        """Yields the request's shape solved from rest; before it, secondary motion until this has settled."""
         if self.is_playing:
             return
         if request.motion is not None:
@@ -89,10 +90,10 @@ class LiveSolver:
         try:
             yield self.frame_solver.solve_from_rest(request, token.watch(native.library().Task()))
         except native.library().Cancelled:
-            solver.motion_state = before  # a drag goes on
+            solver.motion_state = before  # the next solve of the drag starts there
 
     def _step(self, request):
-        """Steps to the request in as many seconds as have passed since the last step."""
+        """Integrates secondary motion over the time since the last step."""
         now, before = time.monotonic(), self._stepped_at
         if before is None:
             self.frame_solver.solver.solve(self.frame_solver.apply_request(request))
@@ -102,7 +103,7 @@ class LiveSolver:
         self._stepped_at, self._stepped_motion = now, request.motion
 
     def _settle(self, request, token):
-        """Yields shapes in real time until it has come to rest."""
+        """Yields shapes in real time until the motion has come to rest."""
         still, size = 0, np.ptp(self.samples.points, axis=0).max()
         while still < STILL_STEPS and not token.cancelled:
             began = time.monotonic()

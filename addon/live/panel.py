@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The buttons of live mode, which the sections of deforming and stylizing show, and secondary motion."""
+"""Buttons of live mode, for the sections Deform and Stylize, and the panel of secondary motion."""
 
 import bpy
 
@@ -15,7 +15,7 @@ from .properties import SECONDARY
 
 
 def live_buttons(layout, source, kind, refusal):
-    """Live on and off, and while it is on a way to keep the shape; grey where there is a refusal."""
+    """Draws the toggle of live mode, greyed out if there is a refusal, and while live Keep Shape."""
     on = sessions.is_live(source, kind)
     row = layout.row(align=True)
     row.scale_y = 1.4
@@ -28,7 +28,7 @@ def live_buttons(layout, source, kind, refusal):
 
 
 def solved_frames(source, scene):
-    """(how many of the scene's frames live mode has solved, how many there are); None where none is."""
+    """(solved frames, all frames) of the scene's range; None if no frame was requested."""
     session = sessions.live.get(source.session_uid)
     frames = None if session is None else session.playback.frames
     if frames is None:
@@ -38,7 +38,7 @@ def solved_frames(source, scene):
 
 
 def playback_progress(layout, source, kind):
-    """How many of the scene's frames are solved already."""
+    """Draws a progress bar of the scene's solved frames."""
     on = sessions.is_live(source, kind)
     solved = solved_frames(source, bpy.context.scene) if on else None
     if solved is not None:

@@ -1,39 +1,39 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a live session tells frames of an animation from drags: a frame's shape is its own, a drag's goes on
-from the shape before."""
+"""Tells animation frames from drags in a live session: a frame's shape does not depend on what was shown
+before, a drag's solve starts from the last shape."""
 
 from ..blender.host import has_window
 from .solved_frames import SimulatedFrames, SolvedFrames
 
 
 class Playback:
-    """The scene's frames as a session comes by them; on the main thread.
+    """Animation playback of a session; main thread.
 
-    `frame` is the scene's when it was last looked at; None where what is there already is a frame's.
+    `frame`: the scene's at the last update; None makes the first request a frame's.
     """
 
     def __init__(self, solver, frame=None):
         self._solver, self.frame = solver, frame
-        self.frames = None  # SolvedFrames, once one is asked for
-        self._shown = None  # the shape of a frame that is shown
-        self._is_requested = False  # whether the frame at hand is solved, or will be
+        self.frames = None  # SolvedFrames, once a frame is requested
+        self._shown = None  # the frame's Shape on display
+        self._is_requested = False  # whether the current frame is solved or requested
 
     def steps_motion(self, request, frame):
-        """Whether a request is of the next moment of secondary motion, also while its handles hold still."""
+        """Whether a request steps secondary motion to another frame, also if no handle has moved."""
         return request.motion is not None and frame != self.frame
 
     def begin(self, request, frame):
-        """Takes a new request; whether the session's own worker has to solve it."""
+        """Starts a new request; True if the session's worker has to solve it."""
         self._solver.is_playing, self._shown = frame != self.frame, None
         kept = None if self.frames is None else self.frames.get(frame, request)
         self._is_requested = kept is not None and self._solver.is_playing
         if self.steps_motion(request, frame):
-            self._solver.begin_at_rest()  # a drag that follows
+            self._solver.begin_at_rest()  # for a drag after playback
             return False
         return not self._is_requested
 
     def advance(self, request, frame):
-        """The scene is at this frame now; requests its shape where the animation has moved the handles."""
+        """Sets the scene's frame; requests its shape if the request came with a change of frame."""
         self.frame = frame
         if self._solver.is_playing and not self._is_requested and self._solver.frame_solver is not None:
             if self.frames is None:
@@ -49,14 +49,14 @@ class Playback:
         return SimulatedFrames(solver.clone, setup.start, setup.fps, low_priority)
 
     def wait(self, request, seconds):
-        """Until the frame at hand is solved, so many seconds at most; None: however long that takes."""
+        """Waits until the current frame is solved, at most `seconds`; None: without a limit."""
         if self._solver.is_playing:
             self.advance(request, self.frame)
             if self.frames is not None:
                 self.frames.wait(self.frame, request, seconds)
 
     def shape(self, request, otherwise):
-        """The frame's own shape, where it is solved and not yet shown, in place of what the worker has."""
+        """The current frame's shape if solved (None if shown already); else `otherwise`, the worker's."""
         if not self._solver.is_playing or self.frames is None:
             return otherwise
         shape = self.frames.get(self.frame, request)
@@ -66,14 +66,14 @@ class Playback:
         return None if was_shown else shape
 
     def take_news(self):
-        """Whether more frames are solved than when this was asked before."""
+        """Whether frames were solved since the last call."""
         has_news = self.frames is not None and self.frames.has_news
         if has_news:
             self.frames.has_news = False
         return has_news
 
     def is_shown(self):
-        """Whether what is shown is the frame's own shape, or no frame's shape is asked for."""
+        """Whether the current frame's shape is on display, or no frame is requested."""
         return self.frames is None or not self._solver.is_playing or self._shown is not None
 
     def stop(self):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A solver that is set up before it is requested: a tool tells which object its user is about to touch."""
+"""Sets a solver up before live mode starts, for the object that a tool names as the next one."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..solver.frame_solver import FrameSolver
 from ..solver.setup import SolverSetup, energy_weights, sampled
 from ..surface.source_surface import read_surface
 
-LARGEST = 200_000  # vertices of a source that is read without being requested
+LARGEST = 200_000  # most vertices of a source that is prefetched
 
 
 class SolverPrefetch:
@@ -37,13 +37,13 @@ class SolverPrefetch:
         except UserError:
             return
         setup = SolverSetup("DEFORM", surface, None, energy_weights(settings, "DEFORM"), machine_options())
-        if surface.exact:  # a fit may take minutes
+        if surface.exact:  # otherwise a fit is needed, which may take minutes
             self._thread = start_thread("prefetch", lambda: self._make(setup), has_window())
 
     def _make(self, setup):
         try:
             self._solver = FrameSolver(sampled(setup), None)
-        except (ValueError, UserError):  # the session that needs it will tell
+        except (ValueError, UserError):  # the session's own setup reports it
             self._solver = None
 
     def is_ready(self):
@@ -51,8 +51,8 @@ class SolverPrefetch:
         return self._solver is not None
 
     def take(self, setup):
-        """The FrameSolver for this setup but for its handles and masses, now the caller's; or None. On a
-        worker."""
+        """Hands over the FrameSolver if its surface and energy fit the setup, whatever its handles and
+        masses; else None. On a worker."""
         surface = setup.surface
         needs_own = setup.kind != "DEFORM" or not surface.in_place or surface.solids
         if needs_own or self._uid != surface.reference.uid or self._thread is None:

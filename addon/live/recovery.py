@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a file, or a step that was undone, says of live mode where no session stands behind it."""
+"""Reconciles sessions with the live state in the file after undo, redo and load."""
 
 import contextlib
 
@@ -18,7 +18,7 @@ from .sessions import is_live, live, poll_live, take_away
 
 
 def after_undo():
-    """A step was undone or redone: sessions go on with what it has, and those of the step come back."""
+    """Handler of undo and redo: sessions continue with the step's data; those of the step are restarted."""
     live.returning.clear()
     recover(bring_back)
     if live.returning:
@@ -26,13 +26,13 @@ def after_undo():
 
 
 def after_load():
-    """A file was loaded: what was live when it was saved is a result now."""
+    """Load handler: objects that were live when the file was saved become results."""
     recover(adopt)
 
 
 def recover(clear):
-    """Ends what no session or no source knows as live any more; `clear(source)` deals with one that is said
-    to be live, and is not."""
+    """Ends sessions whose source is not live any more, and calls `clear(source)` for sources that are marked
+    as live without a session."""
     for uid, session in list(live.items()):
         source = session.source.find()
         settings = None if source is None else settings_of(source)
@@ -43,8 +43,8 @@ def recover(clear):
             if not session.display.in_place:
                 take_away(session)
         else:
-            session.restored()  # what it wrote may have been undone
-    # A list: clear() deletes objects, and Blender's own iterator would go on from one that is gone.
+            session.restored()  # its motion may have been undone
+    # A list: clear() deletes objects, which invalidates Blender's iterator.
     for source in [s for s in bpy.data.objects if settings_of(s).live_kind and not is_live(s)]:
         with contextlib.suppress(UserError, RuntimeError, AttributeError):
             if not clear(source):
@@ -52,7 +52,7 @@ def recover(clear):
 
 
 def bring_back(source):
-    """Whether the session by which the source was live comes back; a live object without one goes."""
+    """Marks the source's ended session for a restart and returns True; without one, ends the live state."""
     number = settings_of(source).live_number
     former = live.past.get(number)
     if former is not None and former.uid != source.session_uid:
@@ -66,8 +66,8 @@ def bring_back(source):
 
 
 def disown(item):
-    """An object that says it is live without a session of its own: a copy of one that is, or one from another
-    file."""
+    """Ends the live state of an object without a session: a duplicate of a live object, or one linked or
+    appended from another file."""
     settings = settings_of(item)
     if not settings.live_kind or is_live(item) or item.session_uid in (live.begun, *live.returning):
         return
@@ -81,7 +81,7 @@ def disown(item):
 
 
 def forget_copy(item):
-    """What a copy of a live object shows is its own."""
+    """Ends a duplicate's live state; the shape that it shows stays."""
     visibility.forget(item)
     if item.data.users == 1:
         stored.put_mark(item, "")
@@ -89,14 +89,14 @@ def forget_copy(item):
 
 
 def discard_live_object(source):
-    """The modifier has what that step says."""
+    """Ends the live state and removes the live object, if any; the modifier stays as the undo step has it."""
     item = live_object.forget(source)
     if item is not None:
         result_objects.discard(item)
 
 
 def adopt(source):
-    """Keeps the shape that was seen as a result."""
+    """Turns the live shape of a source without a session into a result."""
     settings, kind = settings_of(source), settings_of(source).live_kind
     item = next((entry.item for entry in settings.results if entry.kind == live_object.LIVE), None)
     if item is not None and not in_scene(item):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live shapes at the frame that the scene has come to: in renders exactly, in the window as far as solved."""
+"""Live shapes after a change of frame: renders wait for the solve, the viewport shows solved frames only."""
 
 import contextlib
 
@@ -17,7 +17,7 @@ from .sessions import WAIT, end_with_error, live
 
 
 def follow_frame(depsgraph):
-    """Shows every live shape as it is at the frame that is about to be rendered."""
+    """Shows every live shape, solved, at the frame that is about to be rendered."""
     for uid, session in list(live.items()):
         try:
             source = session.source.get()
@@ -28,7 +28,7 @@ def follow_frame(depsgraph):
             warn_of_hidden(source, session, depsgraph)
             session.set_request(session.reader.request(bpy.context, depsgraph), scene_frame(depsgraph.scene))
             session.worker.wait(WAIT, refined=True)
-            session.playback.wait(session.requested, None)  # a picture of another frame would be none
+            session.playback.wait(session.requested, None)  # without a limit: the image must show this frame
             session.show()
         except SourceChanged:
             continue
@@ -37,9 +37,9 @@ def follow_frame(depsgraph):
 
 
 def show_frame():
-    """Shows what is known at the frame that the scene has come to, in the same picture."""
+    """Shows the shapes of the new frame that are solved already, before the viewport is redrawn."""
     for session in list(live.values()):
-        with contextlib.suppress(UserError, ValueError, ReferenceError):  # the timer tells
+        with contextlib.suppress(UserError, ValueError, ReferenceError):  # the timer reports it
             session.show_frame(bpy.context)
 
 

@@ -25,17 +25,17 @@ from .live_solver import PACE, LiveSolver
 from .playback import Playback, scene_frame
 
 PATIENCE = 1.0  # seconds at most that playback waits for a frame of secondary motion
-numbers = itertools.count(int(time.time()) % 10**9)  # of sessions: others than those of an earlier Blender
+numbers = itertools.count(int(time.time()) % 10**9)  # of sessions; unlike those of an earlier process
 
 
 class Session:
-    """Reads its source when made, on the main thread; everything that takes time is done by the worker.
+    """Reads its source in the constructor, on the main thread; the worker solves.
 
-    What is shown of an `earlier` session of the source, a Former, is used again. `keeps_shape`: what it shows
-    is the user's work, which stays at the end. `gone`: what layers.make_way() has taken away for it.
+    `earlier`: Former of the source's last session, whose display is reused. `keeps_shape`: the shape is the
+    user's work and stays when live mode ends. `gone`: what layers.make_way() has removed for the session.
 
-    Where the shape that the file has is that of the request at hand (stored.py), as after an undone step, it
-    stays bit for bit. Where not, it was stored on its way, or too early: the request's own shape is shown.
+    If the shape in the file belongs to the current request (stored.py), as after undo, it stays bit for bit.
+    Otherwise it was stored before the solve had ended, and the request is solved.
     """
 
     def __init__(self, context, source, kind="DEFORM", earlier=None, keeps_shape=False, gone=()):
@@ -48,10 +48,10 @@ class Session:
         is_still = keeps_shape or animation_range(source, kind) is None
         self.playback = Playback(self.solver, scene_frame(context.scene) if is_still else None)
         self.requested = None  # the newest Request
-        self.touching = None  # (k, 3) where the shape that is shown touches, in local coordinates
-        self.is_restored = earlier is not None  # whether the file may have the shape of the request at hand
-        self.is_held = False  # whether its shape counts as that, whatever it is
-        self.is_quiet = False  # whether nothing is shown, until a handle moves
+        self.touching = None  # (k, 3) contact points of the shape on display, in local coordinates
+        self.is_restored = earlier is not None  # whether the shape in the file may be the current request's
+        self.is_held = False  # whether that shape counts as the request's without a comparison
+        self.is_quiet = False  # whether solved shapes stay hidden until a handle moves
         self.display = display_of(context, source, self.reader.surface, earlier)
         self.carrying.bind(context, earlier.carried if earlier else None)
         self.number = next(numbers)
@@ -70,7 +70,7 @@ class Session:
         return self.reader.carrying
 
     def _start(self, context):
-        """Coroutine (core/coroutines.py) that reads the vertex groups; then the worker sets out."""
+        """Coroutine (core/coroutines.py) that reads the vertex groups, then starts the worker."""
         yield from self.reader.read_setup(context)
         has_motion = secondary_motion.is_used(self.source.get())
         self.worker = LatestRequestWorker(
@@ -82,13 +82,13 @@ class Session:
         )
 
     def advance(self):
-        """Reads on for a moment; whether the worker has set out."""
+        """Continues to read for a moment; True once the worker is started."""
         if self.worker is None:
             step_for(self._reading)
         return self.worker is not None
 
     def wait(self, seconds, refined):
-        """Until the worker has reached the newest request, so many seconds at most."""
+        """Waits until the worker has solved the newest request, at most `seconds`."""
         if self.worker is None:
             run_to_completion(self._reading)
         self.update(bpy.context)
@@ -97,7 +97,7 @@ class Session:
             self.playback.wait(self.requested, seconds)
 
     def settle(self, seconds):
-        """Shows the newest request's own shape, which then stays; motion is not waited for."""
+        """Shows and keeps the newest request's shape, solved from rest unless it has secondary motion."""
         self.wait(seconds, refined=not self.has_motion)
         self.show()
         self.keep_shown()
@@ -114,16 +114,16 @@ class Session:
 
     @property
     def has_motion(self):
-        """Whether what is requested has secondary motion."""
+        """Whether the newest request has secondary motion."""
         return self.requested is not None and self.requested.motion is not None
 
     def update(self, context):
-        """Sends a new request to the worker; SourceChanged where the solver must be set up anew."""
+        """Sends a new request to the worker; raises SourceChanged if the solver must be set up anew."""
         if not self.advance():
             return
         source = self.source.get()
         self.display.require(source)
-        if source.mode in PAUSING:  # it goes on from what the user leaves
+        if source.mode in PAUSING:  # the session continues after the mode ends
             self.edits.may_be_edited = True
             return
         if self.is_restored:
@@ -146,11 +146,11 @@ class Session:
             self.keep_shown()
 
     def waits(self, source):
-        """Whether the user is about to choose what the style needs."""
+        """Whether the user still has to choose the style's object or handle."""
         return self.kind == "STYLIZE" and style_settings.is_begun(source)
 
     def stays(self, source, request):
-        """Whether the source shows, or showed before, what the file says that this request has."""
+        """Whether the source shows the request's stored shape, recalled from the cache if necessary."""
         if not self.display.in_place:
             return False
         if self.is_held:
@@ -159,14 +159,14 @@ class Session:
         return stored.recall(source, self.digest(request))
 
     def digest(self, request):
-        """Equal for requests of the same shape."""
+        """Hash of a request and the setup; equal for requests of the same shape."""
         setup = self.reader.setup
         surface = setup.surface
         further = surface.space.local_to_solve, surface.stiffness, surface.solids, setup.region, setup.masses
         return request.digest(self.reader.fingerprint, self.layout, *further)
 
     def is_current(self, context):
-        """Whether the shape that the file has is the one that its handles ask for."""
+        """Whether the shape in the file is the one of the present handles."""
         if self.worker is None:
             return False
         context.view_layer.update()
@@ -178,13 +178,13 @@ class Session:
         return stored.mark(source) == stored.wanted(source, self.digest(self.reader.request(context)))
 
     def keep_shown(self):
-        """What is shown now stays at the end, where it is the user's work."""
+        """With `keeps_shape`, makes the shape on display the one that stays when live mode ends."""
         if self.keeps_shape and self.display.in_place:
             self.display.before = motion.snapshot(self.source.get())
             self.carrying.renew()
 
     def set_request(self, request, frame):
-        """Goes for this request, which was read at that frame of the scene."""
+        """Requests a solve of `request`, which was read at that frame of the scene."""
         is_new = self.requested is None or self.playback.steps_motion(request, frame)
         if is_new or not request.is_like(self.requested):
             self.requested, self.is_quiet = request, self.is_restored
@@ -193,7 +193,8 @@ class Session:
         self.playback.advance(self.requested, frame)
 
     def restored(self, is_held=False):
-        """What the source and its handles are now came from elsewhere: an undone step, a cancelled drag.
+        """Called after undo or a cancelled drag has changed the source and its handles.
+
 
         `is_held`: the shape stays as it is until a handle moves.
         """
@@ -218,14 +219,14 @@ class Session:
         return is_shown
 
     def note(self, source, shape):
-        """Notes what the shape is of that is shown now."""
+        """Marks the source with the digest of the request whose shape is on display."""
         key = stored.UNSETTLED if shape.of is None else self.digest(shape.of)
         stored.put_mark(source, key)
         if shape.of is not None:
             stored.shapes.keep(key, motion.Motion(shape.points - shape.rest, shape.turns, shape.changes))
 
     def show_frame(self, context):
-        """Shows a frame that is solved already, or one of secondary motion, which is waited for."""
+        """Shows the current frame if it is solved; with secondary motion, waits up to PATIENCE for it."""
         if self.playback.frames is None and not self.has_motion:
             return
         self.edits.may_have_moved = self.reader.moves_by_itself
@@ -235,12 +236,12 @@ class Session:
         self.show()
 
     def show_last(self):
-        """What the worker made before it ended, whose errors no longer matter."""
+        """Shows the last shape of a worker that has ended; its errors are ignored."""
         with contextlib.suppress(UserError, ReferenceError):
             self.show()
 
     def take_away(self, source):
-        """Everything looks as it did before; `source` is None where it is gone."""
+        """Restores the state from before live mode; `source` is None if it was deleted."""
         if self.keeps_shape and source is not None:
             visibility.forget(source)
         self.display.take_away(source)

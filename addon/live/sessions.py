@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live mode: while handles move or a style's sliders change, shapes follow; off, all is as it was.
+"""Live mode: shapes follow handles and a style's sliders; its end restores the earlier state.
 
 A tool or script makes an object live with begin(context, source), has it show the newest shape with
 update(context) (in a window a timer does), and ends it with end(context, source, keep).
@@ -23,24 +23,24 @@ from .session import Session
 from .shown_scene import ShownScene
 from .stored import Kept
 
-INTERVAL = 1 / 60  # seconds between looks
+INTERVAL = 1 / 60  # seconds between calls of the timer
 WAIT = 30.0  # seconds at most that a script waits for the first shape
 
 
 class Sessions(dict):
     """{session_uid of the source: Session} of all that is live."""
 
-    is_rendering = False  # then frames are followed one by one, and nothing else
+    is_rendering = False  # during renders, sessions follow changes of frame only
     begun = None  # session_uid of a source whose session is being made
 
     def __init__(self):
         # {number of a session that has ended: Former}; Blender undoes up to 256 steps.
         self.past = Kept(lambda former: former.display.arrays)
         self.shown_scene = ShownScene()
-        self.returning = {}  # session_uid of a source: Former, of which an undone step says that it is live
+        self.returning = {}  # {session_uid of a source: Former}, to be restarted after undo
 
     def part_with(self, uid):
-        """Stops a session, which an undone step may bring back; returns it, or None."""
+        """Stops a session, which undo may restart; returns it, or None."""
         session = self.pop(uid, None)
         if session is not None:
             session.stop()
@@ -48,7 +48,7 @@ class Sessions(dict):
         return session
 
     def clear(self):
-        """Ends every one and takes its shape away."""
+        """Ends every session and removes its shape."""
         self.is_rendering = False
         self.past.clear()
         self.returning.clear()
@@ -67,7 +67,7 @@ def is_live(source, kind=None):
 
 
 def begin(context, source, kind="DEFORM", keeps_shape=False):
-    """Makes the source live; UserError when that cannot be. The shape appears when the worker has it.
+    """Makes the source live, or raises UserError. The shape appears once the worker has solved it.
 
     `keeps_shape`: what is shown stays when live mode ends.
     """
@@ -98,8 +98,8 @@ def begin(context, source, kind="DEFORM", keeps_shape=False):
 
 
 def end_for_kind(context, source, kind):
-    """Ends live mode before a session of another kind where one of both acts on what the other has made;
-    returns (Former, kind) of what has ended, or None."""
+    """Ends a session of another kind if one of both kinds acts on the other's result; returns (Former, kind)
+    of the ended session, or None."""
     session = live.get(source.session_uid)
     if session is None or session.kind == kind or not session.display.in_place:
         return None
@@ -112,7 +112,7 @@ def end_for_kind(context, source, kind):
 
 
 def go_back(context, source, former, kind):
-    """Makes the source live again as it was before end_for_kind()."""
+    """Restarts the session that end_for_kind() has ended."""
     live.returning[source.session_uid] = former
     begin(context, source, kind, former.keeps_shape)
 
@@ -139,14 +139,14 @@ def end(context, source, keep=False):
 
 
 def end_for_job(context, source, output, result):
-    """Ends live mode before a solve whose result goes there; whether there was any.
+    """Ends live mode before a job with that output and result; True if the source was live.
 
-    Where the result moves the same modifier, the live shape is seen until it comes, and stays if it never
-    does; otherwise the source is what it was before live mode.
+    If the job's result goes to the same modifier, the live shape stays until the job has ended, also if it
+    fails; otherwise the source's state from before live mode is restored.
     """
     session = live.get(source.session_uid)
     if session is None:
-        settings_of(source).live_kind = ""  # what a file or an undone step says, with nothing behind it
+        settings_of(source).live_kind = ""  # set in the file or by undo, without a session
         return False
     stays = session.display.in_place and settings_of(source).result == result
     end(context, source, keep=stays and placement.keeps_mesh(output, result))
@@ -155,7 +155,7 @@ def end_for_job(context, source, output, result):
 
 
 def stop_all():
-    """Ends every worker; what is in the file stays as it is."""
+    """Stops every worker; does not change the file's data."""
     live.is_rendering = False
     live.past.clear()
     live.returning.clear()
@@ -164,7 +164,7 @@ def stop_all():
 
 
 def update(context, wait=0.0, refined=False):
-    """Looks at every live source once, waiting at most so many seconds for the shapes to follow."""
+    """Updates every session once; waits at most `wait` seconds for each shape."""
     return_all(context)
     live.shown_scene.follow(context, live.values())
     for uid, session in list(live.items()):
@@ -181,8 +181,8 @@ def update(context, wait=0.0, refined=False):
 
 
 def settle(context, uid):
-    """Shows the own shape of what that source's handles ask for now."""
-    for _ in range(2):  # the first look may set a solver up anew
+    """Shows the source's shape for its present handles, solved from rest."""
+    for _ in range(2):  # the first update may set the solver up anew
         update(context, WAIT)
         if uid in live:
             with contextlib.suppress(SourceChanged):
@@ -196,7 +196,7 @@ def warn(session):
 
 
 def end_with_error(uid, session, error):
-    """An undone step brings it back; a source that was deleted stays as it is."""
+    """Ends a session and reports the error; undo may restart it. A deleted source is left as it is."""
     source = session.source.find()
     live.part_with(uid)
     if not session.display.in_place or source is None or in_scene(source):
@@ -205,13 +205,13 @@ def end_with_error(uid, session, error):
 
 
 def take_away(session):
-    """Takes the live shape away, also where an undone step left the source or the shape in no scene."""
+    """Removes the live shape, even if undo has unlinked the source or the shape from all scenes."""
     with contextlib.suppress(UserError, ReferenceError, AttributeError):
         session.take_away(session.source.find())
 
 
 def watch(depsgraph):
-    """Looks through what Blender has just updated for edits of live sources, and motion before the field."""
+    """Passes a depsgraph's updates to every session, to detect edits and motion before the field."""
     if live:
         updates = Updates.of(depsgraph)
         for session in live.values():
@@ -219,7 +219,7 @@ def watch(depsgraph):
 
 
 def restart(context, uid, session):
-    """The source or its handles changed: the solver is set up anew, the shape stays where it is."""
+    """Sets the solver up anew after an edit of the source or its handles; the shape stays on display."""
     source = session.source.get()
     try:
         begin(context, source, session.kind, session.keeps_shape)
@@ -228,7 +228,7 @@ def restart(context, uid, session):
 
 
 def return_all(context):
-    """Has what an undone step says to be live be so again."""
+    """Restarts the sessions that undo has put into `live.returning`."""
     for source in [one for one in live.returning and bpy.data.objects if one.session_uid in live.returning]:
         former, kind = live.returning[source.session_uid], settings_of(source).live_kind
         try:
@@ -240,7 +240,7 @@ def return_all(context):
 
 
 def poll_live():
-    """Called between redraws; ends when nothing is live."""
+    """Timer callback; unregisters itself when nothing is live."""
     if not live and not live.returning:
         return None
     if not live.is_rendering:

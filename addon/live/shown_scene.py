@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene that the window shows. Blender evaluates each for itself, and writes the objects' places back to
-the file only from the one that is shown: after a switch they are those of the scene before."""
+"""The window's scene. Each scene has a depsgraph of its own, and Blender copies evaluated transforms to the
+original objects only from the active one: after a switch they are still those of the scene before."""
 
 import bpy
 
@@ -9,12 +9,12 @@ from ..solver.frame_range import involved
 
 
 class ShownScene:
-    """Which scene was looked at last; None before the first look."""
+    """`uid`: session_uid of the scene at the last check; None before the first one."""
 
     uid = None
 
     def follow(self, context, sessions):
-        """Where the window has come to another scene, has Blender place there what live shapes follow."""
+        """After a switch of scenes, tags and evaluates the objects that live shapes follow."""
         before, self.uid = self.uid, context.scene.session_uid
         if before in (None, self.uid):
             return

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of a live source that were solved once, and the thread that solves them beside the window.
+"""Cache of a live source's solved frames, and the background thread that fills it.
 
-A frame's shape is that of its request alone, solved from rest: the order in which frames are seen does not
-matter. Each shape is kept with its request, so that a frame is never shown whose handles, style or points
-have changed since.
+A frame is solved from rest, so that its shape does not depend on the order of playback. Each shape is cached
+with its request, and is dropped when the handles, the style or the points of its frame have changed.
 """
 
 import threading
@@ -27,7 +26,7 @@ class SolvedFrames:
         self._changed = threading.Condition()
         self._requests, self._kept = {}, {}  # frame: request; frame: (request, shape or error, edition)
         self._task, self._ended, self._edition, self._bytes = native.library().Task(), False, 0, 0
-        self.has_news = False  # whether another frame was solved since somebody looked
+        self.has_news = False  # whether a frame was solved since Playback.take_news()
         self._thread = start_thread("frames", self._run, low_priority)
 
     def get(self, frame, request):
@@ -37,7 +36,7 @@ class SolvedFrames:
             if kept is None:
                 return None
             if not kept[0].is_like(request):
-                self._edition += 1  # the animation was edited: what is not seen again counts no more
+                self._edition += 1  # the animation was edited: count() counts frames seen since then
                 self._drop(frame)
                 return None
             self._kept[frame] = (*kept[:2], self._edition)
@@ -53,7 +52,7 @@ class SolvedFrames:
             self._changed.notify_all()
 
     def wait(self, frame, request, timeout):
-        """The shape of that frame, requested if need be; None when it takes longer than so many seconds."""
+        """The shape of that frame, requested if necessary; None if it takes longer than `timeout` seconds."""
         shape = self.get(frame, request)
         if shape is None:
             self.request(frame, request)
@@ -116,14 +115,14 @@ class SolvedFrames:
 
 
 class SimulatedFrames(SolvedFrames):
-    """The same for a source with secondary motion, whose frames follow from those before them.
+    """Frames of a source with secondary motion: each is a time step from the one before.
 
-    A frame that was solved without all that lead to it is solved again once those are known.
+    A frame that was solved without all earlier ones is solved again once these are known.
     """
 
     def __init__(self, clone, start, fps, low_priority=False):
         self._simulation = Simulation(start, fps)
-        self._rough = set()  # frames that were solved without all that lead to them
+        self._rough = set()  # frames that were solved without all earlier ones
         super().__init__(clone, low_priority)
 
     def get(self, frame, request):
@@ -157,7 +156,7 @@ class SimulatedFrames(SolvedFrames):
 
 
 def bytes_of(shape):
-    """Bytes that belong to a shape alone."""
+    """Bytes of the arrays that a shape does not share with others."""
     parts = getattr(shape, "points", None), getattr(shape, "turns", None)
     carried = sum(part.nbytes for _, part in getattr(shape, "carried", ()))
     return carried + sum(part.nbytes for part in parts if part is not None)

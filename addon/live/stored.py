@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which pose the shape is of that a live source has; and shapes once shown, for steps that are undone.
+"""Marks for the pose that a live source's shape belongs to, and a cache of shown shapes for undo.
 
-Undo leaves a mesh as it is where two steps hold the same one, whatever live mode has written since. So a mark
-on the mesh itself tells what its shape is of, and the object tells where another shape is held for a pose.
+Undo does not restore a mesh that both undo steps share, even if live mode has written to it since. So a mark
+on the mesh names the pose of its shape, and the object's `held` the shape that replaces a pose's own.
 """
 
 import hashlib
@@ -14,12 +14,13 @@ from ..field_modifier import motion
 from ..field_nodes import helper
 from ..names import SHAPE_OF
 
-UNSETTLED = "?"  # the mark of a shape that is on its way to another
-MOST, LARGEST = 1000, 1 << 28  # items that are kept, and bytes of their arrays
+UNSETTLED = "?"  # the mark of a shape whose solve has not ended
+MOST, LARGEST = 1000, 1 << 28  # size of the cache: items, and bytes of their arrays
 
 
 class Kept(dict):
-    """{key: item}, the one used last at the end; the first ones go where there are too many.
+    """Cache {key: item} that drops the items that were kept first.
+
 
     `arrays_of(item)` are its arrays, or None; items may share them.
     """
@@ -46,7 +47,7 @@ shapes = Kept(arrays_of)  # {mark: Motion}
 
 
 def mark(source):
-    """What the motion that the source has is of; "" where live mode did not put it there."""
+    """The mark of the source's motion; "" if live mode did not write it."""
     modifier = modifier_stack.find(source)
     return "" if modifier is None else motion.carrier(source, modifier).get(SHAPE_OF, "")
 
@@ -64,7 +65,7 @@ def put_mark(source, key):
 
 
 def hold(source, pose):
-    """The shape that the source has counts as that of a pose, by its digest."""
+    """Makes the source's present shape that of a pose, given by its digest."""
     shape = motion.snapshot(source)
     if shape is None:
         return
@@ -76,13 +77,13 @@ def hold(source, pose):
 
 
 def wanted(source, pose):
-    """The mark of the shape that the file has, or should have, of that pose."""
+    """The mark of a pose's shape: of the one that is held for it, or the pose's digest."""
     held = settings_of(source).held
     return held if held.startswith(f"{pose} ") else pose
 
 
 def recall(source, pose):
-    """Has the source show that shape, bit for bit, where it does or did before; whether it does."""
+    """Shows a pose's shape again, bit for bit, from the mesh or the cache; False if neither has it."""
     key, nodes = wanted(source, pose), helper.of(source)
     if nodes is not None and nodes.data.get(SHAPE_OF) != key:
         return False

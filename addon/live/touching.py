@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A tint in the viewport where a live shape touches what it does not pass."""
+"""Viewport overlay that draws a live shape's contact points."""
 
 import bpy
 import gpu
@@ -13,7 +13,7 @@ COLOUR, SIZE = (1.0, 0.35, 0.1, 0.8), 7.0  # pixels
 
 
 def places():
-    """(k, 3) in world space: where the panel's source touches, as it is shown."""
+    """(k, 3) contact points of the panel's source, in world space."""
     source = source_of(bpy.context)
     session = sessions.live.get(source.session_uid) if source is not None else None
     touching = None if session is None or session.is_quiet else session.touching
@@ -33,7 +33,7 @@ def draw():
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     shader.uniform_float("color", COLOUR)
     gpu.state.blend_set("ALPHA")
-    gpu.state.depth_test_set("NONE")  # what it touches hides it
+    gpu.state.depth_test_set("NONE")  # obstacles would hide the points
     gpu.state.point_size_set(SIZE)
     batch_for_shader(shader, "POINTS", {"pos": found.astype(np.float32).tolist()}).draw(shader)
     gpu.state.point_size_set(1.0)

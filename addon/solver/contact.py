@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a source does not pass, read as it is shown."""
+"""A source's contact settings, and its obstacles as evaluated meshes."""
 
 import hashlib
 from typing import NamedTuple
@@ -16,22 +16,22 @@ from ..core.errors import UserError
 from ..core.geometry.spaces import inverse, space_of, transform
 from ..core.runtime import native
 
-DIGITS = 5  # of an uneven scale: what turns in single precision stays the same solid
+DIGITS = 5  # of a non-uniform scale; rounded, so that a rotation in single precision keeps a solid's key
 
 
 class Solid(NamedTuple):
-    """An obstacle. Where two have the same `key`, they are equal but for where they lie."""
+    """An obstacle. Solids of equal `key` have equal vertices and triangles."""
 
     key: str
     vertices: np.ndarray  # (n, 3) in a space of its own
     triangles: np.ndarray  # (m, 3)
-    placement: np.ndarray  # (4, 4) from there into solve space: it turns, moves and scales evenly
+    placement: np.ndarray  # (4, 4) from there into solve space: a similarity
     margin: float
     name: str
 
 
 class ContactTerm(NamedTuple):
-    """In solve space; where two have the same `key`, they are equal."""
+    """Contact in solve space; terms of equal `key` are equal."""
 
     key: str
     solids: tuple  # of Solid
@@ -40,8 +40,8 @@ class ContactTerm(NamedTuple):
     itself: bool
 
     def made(self, known=None):
-        """The library's Contact; on a worker. `known`: {key of a solid: its distance}, brought up to date, so
-        that what only moves is the same obstacle."""
+        """The native Contact; on a worker. `known`: cache {key of a Solid: MeshSdf}, updated in place, so
+        that an obstacle that only moves keeps its signed distance."""
         af, known = native.library(), {} if known is None else known
         distances = {
             solid.key: known.get(solid.key) or af.MeshSdf(solid.vertices, solid.triangles)
@@ -56,7 +56,7 @@ class ContactTerm(NamedTuple):
         return af.Contact(obstacles, ground=self.ground, up=self.up, itself=self.itself)
 
     def touched(self, known, points, near):
-        """(n,) whether points in solve space are that near to a margin; `known` as made() left it."""
+        """(n,) whether points in solve space are within `near` of a margin; `known`: the cache of made()."""
         result = np.zeros(len(points), dtype=bool)
         if self.ground is not None:
             result |= points @ np.array(self.up) < self.ground + near
@@ -72,7 +72,7 @@ def native_contact(term, known=None):
 
 
 def notes_on(term, handles, report):
-    """What crosses the surface, and which handles contact holds back, by a solve's report, as UserErrors."""
+    """UserErrors by a solve's report: obstacles that cross the surface, handles held back by contact."""
 
     def solid(name):
         return term.solids[int(name.removeprefix("obstacles[").rstrip("]"))]
@@ -83,7 +83,7 @@ def notes_on(term, handles, report):
     ]
     for held in report.contact.held:
         handle = handles[held.handle]
-        if not handle.name:  # what is far from all pins
+        if not handle.name:  # holds the region that is far from all pins
             continue
         if held.by == "ground":
             found.append(UserError("{name} is held back by the ground", handle))
@@ -95,20 +95,20 @@ def notes_on(term, handles, report):
 
 
 def listed(entry):
-    """The objects that a row of the list means."""
+    """The objects of a row in the list of obstacles."""
     return entry.group.all_objects if entry.group is not None else [entry.item]
 
 
 def lasting(source):
-    """What stays as it is while frames are played, comparable: the objects of the list that are in a scene,
-    and those in the way, but for what its animation hides."""
+    """Comparable state that playback does not change: session_uids of the listed objects that are in a scene,
+    and of active obstacles whose visibility is not animated."""
     rows = settings_of(source).contact.obstacle_list
     in_way = {item.session_uid for item, _ in obstacles_of(source) if not blinks(item)}
     return {item.session_uid for entry in rows for item in listed(entry) if in_scene(item)}, in_way
 
 
 def blinks(item):
-    """Whether keys, strips or drivers may hide an object."""
+    """Whether keyframes, NLA strips or drivers may hide an object."""
     data, path = item.animation_data, "hide_viewport"
     if data is None:
         return False
@@ -116,7 +116,7 @@ def blinks(item):
 
 
 def obstacles_of(source):
-    """[(object, margin)] of what the list has in the way of a source: each object once."""
+    """[(object, margin)] of a source's active obstacles, each object once."""
     carried, found = {entry.item for entry in settings_of(source).carried}, {}
     for entry in settings_of(source).contact.obstacle_list:
         for item in listed(entry):
@@ -127,7 +127,7 @@ def obstacles_of(source):
 
 
 def is_shown(item):
-    """Whether an object is seen in the viewport, whatever a local view shows."""
+    """Whether an object is visible in the view layer, local view aside."""
     layer, space = bpy.context.view_layer, bpy.context.space_data
     if item.visible_get(view_layer=layer):
         return True
@@ -136,7 +136,7 @@ def is_shown(item):
 
 
 def entry_refusal(source, entry):
-    """Why a row of the list is not in the way, or cannot be, as a UserError; else None."""
+    """UserError that says why a row of the list is no active obstacle; else None."""
     if entry.group is not None:
         return refusal_of_group(source, entry.group)
     if entry.item is None or not in_scene(entry.item):
@@ -153,7 +153,7 @@ def entry_refusal(source, entry):
 
 
 def refusal_of_group(source, group):
-    """Why a collection, or something in it, is not in the way, as a UserError; else None."""
+    """UserError that says why a collection, or an instance in it, is no active obstacle; else None."""
     shown = [item for item in group.all_objects if is_shown(item)]
     if instance := next((item for item in shown if item.is_instancer and item.type == "EMPTY"), None):
         return UserError("{name} is an instance; make it real to have it in the way", instance)
@@ -164,7 +164,7 @@ def refusal_of_group(source, group):
 
 
 def refusal(source):
-    """The UserError of a contact with nothing, as far as it is seen without reading; else None."""
+    """UserError if contact has no obstacle, ground or self-contact, without reading meshes; else None."""
     group = settings_of(source).contact
     if not group.use or group.use_ground or group.itself or obstacles_of(source):
         return None
@@ -174,7 +174,7 @@ def refusal(source):
 
 
 def contact_of(source, settings, space, depsgraph):
-    """The ContactTerm that an object's settings, maybe as a render has them, ask for; or None."""
+    """The ContactTerm of an object's settings, original or evaluated for a render; or None."""
     group = settings.contact
     if not group.use:
         return None
@@ -193,7 +193,7 @@ def contact_of(source, settings, space, depsgraph):
 
 
 def for_job(context, source, fast):
-    """The same for a solve of its own, by the `fast` method; UserError where nothing is in the way."""
+    """The ContactTerm of a job; UserError if contact is empty, or on without the method Fast."""
     reason = refusal(source)
     if reason is None and settings_of(source).contact.use and not fast:
         reason = UserError("{name}: Contact needs the method Fast, without Exact Handles", source)
@@ -204,7 +204,7 @@ def for_job(context, source, fast):
 
 
 def read(item, margin, space, depsgraph):
-    """The Solid of an obstacle as it is shown; None where its scale leaves nothing of it."""
+    """The Solid of an obstacle's evaluated mesh; None if its scale makes it a point."""
     seen = item.evaluated_get(depsgraph)
     mesh = seen.to_mesh()
     try:
@@ -217,7 +217,7 @@ def read(item, margin, space, depsgraph):
     try:
         own = space_of(to_solve, item.name)
         vertices, placement = transform(np.round(own.local_to_solve, DIGITS), vertices), own.solve_to_world
-    except UserError:  # flat: a sheet
+    except UserError:  # its scale makes it a flat sheet
         vertices, placement = transform(to_solve, vertices), np.eye(4)
         if np.ptp(vertices, axis=0).max() == 0.0:
             return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames the animation of a source's handles, style or target spans."""
+"""Frame range of the animation of a source's handles, style or target."""
 
 import bpy
 
@@ -10,21 +10,21 @@ from .contact import listed
 
 
 def animation_range(source, kind):
-    """(first, last) frame of all that moves the handles, the style, the target or the source; None where
-    nothing does."""
+    """(first, last) frame of the animation of the source, its handles, style or target; None without
+    animation."""
     ranges = [span for item in involved(source, kind) for span in ranges_of(item)]
     return (min(first for first, _ in ranges), max(last for _, last in ranges)) if ranges else None
 
 
 def scene_range(scene):
-    """(first, last) frame of the scene, or of its preview where that is on."""
+    """(first, last) frame of the scene, or of its preview range if that is on."""
     if scene.use_preview_range:
         return scene.frame_preview_start, scene.frame_preview_end
     return scene.frame_start, scene.frame_end
 
 
 def involved(source, kind):
-    """The data-blocks, and what they hang on, whose animation a source's shape follows; each once."""
+    """The data-blocks whose animation a source's shape follows, with their dependencies; each once."""
     settings = settings_of(source)
     used, style = [source], settings.stylize
     if kind == "WRAP":
@@ -50,7 +50,7 @@ def involved(source, kind):
 
 
 def objects_of(parts):
-    """The objects on which modifiers or constraints hang: targets, poles, inputs of nodes."""
+    """The objects that modifiers or constraints refer to: targets, poles, inputs of nodes."""
     for part in parts:
         for holder in (part, *getattr(part, "targets", ())):
             names = [one.identifier for one in holder.bl_rna.properties if one.type == "POINTER"]
@@ -61,14 +61,14 @@ def objects_of(parts):
 
 
 def read_by_drivers(item):
-    """The data-blocks from which drivers of this one read."""
+    """The data-blocks that this one's drivers read."""
     data = getattr(item, "animation_data", None)
     for curve in data.drivers if data else ():
         yield from (target.id for variable in curve.driver.variables for target in variable.targets)
 
 
 def ranges_of(item):
-    """(first, last) of each action and strip that moves a data-block."""
+    """(first, last) frame of each action and unmuted NLA strip of a data-block."""
     data = getattr(item, "animation_data", None)
     if data is None:
         return

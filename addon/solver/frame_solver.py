@@ -16,32 +16,32 @@ from .contact import native_contact
 from .request import Request
 from .setup import at_samples
 
-REST_STEPS, FINE_TOLERANCE = 400, 1e-6  # of a solve from rest: until the energy falls no more
-STYLE = presets("live").get("STYLE")  # label, tip, and options for a style, which acts everywhere
+REST_STEPS, FINE_TOLERANCE = 400, 1e-6  # of a solve from rest: to convergence
+STYLE = presets("live").get("STYLE")  # preset for styles: label, tip, options
 LEAST_RIGIDITY = 1e-3  # of a style
-TRACKED = 2000  # splats that are followed from step to step
-TOUCHED = 2000  # points that are looked at for a touch
-TOUCH = 5e-3  # what is that near, in cube units, touches
+TRACKED = 2000  # about as many splats are tracked
+TOUCHED = 2000  # about as many points are tested for contact
+TOUCH = 5e-3  # distance from an obstacle's margin that counts as contact, in cube units
 
 
 @dataclass(frozen=True)
 class Shape:
-    """What a request leads to, in local coordinates, single precision."""
+    """The result of a request, in local coordinates, single precision."""
 
     points: np.ndarray  # (n, 3)
-    rest: np.ndarray | None  # (n, 3) where the source's own points are without the field; None for surfaces
-    turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
-    changes: dict | None = None  # of splats' attributes
-    touching: np.ndarray | None = None  # (k, 3) where it touches, of a part of the points
+    rest: np.ndarray | None  # (n, 3) the source's points without the field; None for implicit surfaces
+    turns: np.ndarray | None = None  # (n, 3) rotation vectors (axis · angle), for free custom normals
+    changes: dict | None = None  # the splats' changed attributes
+    touching: np.ndarray | None = None  # (k, 3) contact points, among a subset of the points
     topology: Topology | None = None
     carried: list = field(default_factory=list)  # what Carrying.moved made
-    of: Request | None = None  # whose own shape this is, from rest; None on the way there
+    of: Request | None = None  # the request, if solved from rest; None for intermediate shapes
 
 
 class FrameSolver:
-    """Turns requests into shapes; for one thread at a time, each other needs a `clone`.
+    """Turns requests into shapes; not thread-safe: each thread needs a `clone`.
 
-    `sampled` is a setup.SampledSource. A solve goes on from the one before, unless it begins at rest.
+    `sampled` is a setup.SampledSource. A solve starts from the last shape, unless it begins at rest.
     """
 
     def __init__(self, sampled, carrying, handles=None, energy=None):
@@ -52,7 +52,7 @@ class FrameSolver:
         self.set_points(setup.surface.local)
         self._make_solver(handles, setup.energy if energy is None else energy)
 
-    shows_touch = False  # whether shapes say where they touch
+    shows_touch = False  # whether shapes have contact points
 
     def clone(self):
         """The same with a native solver of its own, for another thread."""
@@ -72,12 +72,12 @@ class FrameSolver:
 
     @property
     def rest(self):
-        """(n, 3) what the field is evaluated on, in solve space."""
+        """(n, 3) points at which the field is evaluated, in solve space."""
         is_of_source = self.sampled.topology is None
         return self.sampled.setup.surface.vertices if is_of_source else self.sampled.rest
 
     def _make_solver(self, handles, energy):
-        """A native solver for these handles and weights of the energy's terms, which moves nothing yet."""
+        """Makes the native solver for these handles and energy weights; its field starts at rest."""
         af, options, setup = native.library(), {**energy}, self.sampled.setup
         if setup.kind == "STYLIZE":
             options |= STYLE[2]
@@ -91,7 +91,7 @@ class FrameSolver:
         self.solver = af.LiveDeformer(self.sampled.samples, held, options_of("live", options, setup.machine))
         self._track()
         self.handles, self.energy, self.style_key, self.motion = handles, energy, None, None
-        self.contact_key, self.distances = None, {}  # of obstacles, by key
+        self.contact_key, self.distances = None, {}  # {key of a Solid: MeshSdf}
 
     @property
     def moves_splats(self):
@@ -99,7 +99,7 @@ class FrameSolver:
         return surface.splats is not None and surface.in_place
 
     def _track(self):
-        """Of splats, which move with their axes and colours, a few are tracked, to tell how far they went."""
+        """Tracks the points to measure their motion; of splats only some, as the field itself moves them."""
         every = max(1, len(self.rest) // TRACKED) if self.moves_splats else 1
         self.solver.track(self.rest[::every])
 
@@ -110,7 +110,7 @@ class FrameSolver:
         return held
 
     def apply_request(self, request, task=None):
-        """Has the native solver know all of a request but where its handles are; returns that."""
+        """Passes a request to the native solver, except the handles' targets, which are returned."""
         if request.points is not self.before.local and self.sampled.topology is None:
             self.set_points(request.points)
         if request.energy != self.energy:
@@ -128,7 +128,7 @@ class FrameSolver:
         if request.motion != self.motion:
             self._set_motion(request.motion, task)
             self.motion = request.motion
-        # The last, of what is far from all pins, is no handle where nothing is.
+        # The last target belongs to the handle of the region far from all pins, which may be missing.
         return request.targets[: self.handle_count] if request.handles else None
 
     def _set_motion(self, motion, task):
@@ -140,13 +140,13 @@ class FrameSolver:
         self.solver.set_secondary_motion(options, **further, task=task)
 
     def follow(self, request, task=None, **options):
-        """Goes on towards a request from the shape before; returns the steps that were taken."""
+        """Iterates towards a request from the last shape; returns the number of iterations."""
         return self.solver.follow(self.apply_request(request, task), task=task, **options)
 
     def step(self, request, seconds, earlier, state=None, task=None):
-        """Integrates secondary motion over so many seconds; `earlier` is the motion of the request before.
+        """Integrates secondary motion over `seconds`; `earlier` is the motion of the last request.
 
-        `state`: the native state to begin with, in place of that of the step before.
+        `state`: native state to start from, instead of that after the last step.
         """
         targets = self.apply_request(request, task)
         if state is not None:
@@ -155,8 +155,8 @@ class FrameSolver:
         self.solver.step(targets, seconds, coordinates=coordinates, task=task)
 
     def solve_from_rest(self, request, task=None):
-        """The request's own shape, whatever was solved before it: the same bits on any thread."""
-        self.apply_request(request, task)  # before it is at rest: obstacles then begin where they are
+        """The request's shape, independent of earlier solves: the same bits on any thread."""
+        self.apply_request(request, task)  # before reset(): obstacles then start in place
         self.solver.reset()
         self.follow(request, iterations=REST_STEPS, tolerance=FINE_TOLERANCE, task=task)
         return replace(self.exact_shape(request), of=request)
@@ -166,7 +166,7 @@ class FrameSolver:
         return self._shape(request, None if self.moves_splats else self.solver.tracked())
 
     def exact_shape(self, request):
-        """The request's shape by the field itself."""
+        """The request's shape, evaluated from the field."""
         return self._shape(request, self.solver.field(self.rest))
 
     def _shape(self, request, solved):
@@ -189,7 +189,7 @@ class FrameSolver:
         return Shape(in_single(local), self._single, turns, changes, touching, carried=carried)
 
     def _touching(self, request, solved):
-        """(k, 3) where a part of the points touches what the request's contact has, in local coordinates."""
+        """(k, 3) points, of a subset, that touch the request's obstacles or ground, in local coordinates."""
         if request.contact is None:
             return None
         some = np.asarray(solved[:: max(1, len(solved) // TOUCHED)], dtype=np.float64)

@@ -13,7 +13,7 @@ from .secondary_motion import SecondaryMotion
 
 
 class StyleTerm(NamedTuple):
-    """A style as the solver takes it; where two have the same `key`, they are equal."""
+    """A style's parameters for the solver; terms of equal `key` are equal."""
 
     key: tuple
     directions: object  # (k, 3) preferred normals in solve space, or the ObjectStyle there
@@ -23,19 +23,19 @@ class StyleTerm(NamedTuple):
 
     @property
     def what(self):
-        """Equal where only how strongly it acts differs."""
+        """The key without strength and sharpness."""
         return self.key[:-2]
 
 
 class Request(NamedTuple):
-    """One pose. Where two requests are alike, so are the shapes that are solved for them from rest."""
+    """One pose. Requests that are alike have the same shape when solved from rest."""
 
-    targets: list  # of the handles: (4, 4), or (3,) for a point, in solve space
+    targets: list  # the handles' targets: (4, 4), or (3,) for a point, in solve space
     style: StyleTerm | None
-    points: np.ndarray  # (n, 3) the source's own, in local coordinates, where the field is evaluated
+    points: np.ndarray  # (n, 3) the source's points before the field, in local coordinates
     handles: list  # at rest
     energy: dict  # weights of the energy's terms, by name
-    carried: list  # carried.carried_objects.CarriedPose of what goes along
+    carried: list  # carried.carried_objects.CarriedPose of each carried object
     motion: SecondaryMotion | None
     contact: ContactTerm | None = None
 
@@ -53,7 +53,7 @@ class Request(NamedTuple):
         return what == before
 
     def digest(self, *further):
-        """Equal for requests that ask for the same shape, of sources of which `further` is the same."""
+        """Hash of the request and of `further`, parameters of its source; equal for equal shapes."""
         carried = [(pose.points, pose.rest, pose.now, pose.parent) for pose in self.carried]
         hashed = hashlib.sha1()
         parts = self.targets, self.style_key, self.points, self.handles, self.energy, carried, self.motion
@@ -79,7 +79,7 @@ class Request(NamedTuple):
 
 
 def flat(value):
-    """The bytes of all that a value is made of."""
+    """Yields the bytes of a value, recursively through containers and dataclasses."""
     if isinstance(value, np.ndarray):
         yield value.tobytes()
     elif is_dataclass(value):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Secondary motion of a source, as its settings ask for it."""
+"""Secondary motion by a source's settings."""
 
 from typing import NamedTuple
 
@@ -11,15 +11,15 @@ from ..core.geometry.spaces import inverse, pose
 
 
 class SecondaryMotion(NamedTuple):
-    """Options of the motion, and where the source is in the world; in solve space."""
+    """Native options of the motion, and the source's placement in the world; in solve space."""
 
     options: tuple  # ((name, value) of the native options)
-    up: tuple  # (3,) the world's
+    up: tuple  # (3,) the world's up direction
     ground: float | None  # height along `up`
-    world: tuple  # solve → world, row by row
+    world: tuple  # (4, 4) solve → world, flattened row by row
 
     def coordinates_since(self, earlier):
-        """(4, 4) rigid: solve space then → solve space now, where the source has moved in the world."""
+        """(4, 4) rigid: `earlier`'s solve space → the present one; None if the source has not moved."""
         if self.world == earlier.world:
             return None
         now, then = (np.reshape(motion.world, (4, 4)) for motion in (self, earlier))
@@ -32,7 +32,7 @@ def is_used(source):
 
 
 def motion_of(settings, space):
-    """The SecondaryMotion that an object's settings, maybe as a render has them, ask for; or None."""
+    """The SecondaryMotion of an object's settings, original or evaluated for a render; or None."""
     group = settings.secondary
     if not group.use or group.strength == 0.0:
         return None
@@ -49,13 +49,13 @@ def motion_of(settings, space):
 
 
 def group_names(source):
-    """The vertex group that says how much of the motion each part has, if there is one."""
+    """[vertex group with each vertex's share of secondary motion], or []."""
     group = settings_of(source).secondary.group
     return [group] if is_used(source) and group else []
 
 
 def layout_of(source, scene):
-    """What all simulated frames have in common; where it changes, they are solved again."""
+    """Settings that all simulated frames share; after a change the frames are solved again."""
     settings = settings_of(source).secondary
     return (settings.group, settings.start, frame_rate(scene)) if is_used(source) else None
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a solver is set up from, read on the main thread; and what a worker derives from it once."""
+"""The input of a solver, read on the main thread, and the samples that a worker derives from it once."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from ..core.settings.styles import STYLIZE
 from ..surface.source_surface import SourceSurface
 
 SAMPLES = 6000
-# Options of the panels that weigh the terms of the energy.
+# Panel options that are weights of energy terms.
 ENERGY = {"bending", "bending_unit", "barrier", "handle_weight", "symmetry", "rigidity", "keep_stance"}
 
 
@@ -25,25 +25,25 @@ class SolverSetup:
 
     kind: str  # DEFORM or STYLIZE
     surface: SourceSurface
-    cells: int | None  # resolution of the implicit surface that is moved; None: the source's points are
+    cells: int | None  # resolution of the implicit surface to move; None: the source's points are moved
     energy: dict  # weights of the energy's terms, by name
     machine: dict  # options that depend on the machine
     handles: list = ()
     region: np.ndarray | None = None  # weights with which a style acts
-    masses: np.ndarray | None = None  # how much of the secondary motion each vertex has
+    masses: np.ndarray | None = None  # each vertex's share of secondary motion
     start: int = 1  # frame at which secondary motion begins
     fps: float = 24.0
 
 
 @dataclass(frozen=True)
 class SampledSource:
-    """A setup's samples, and what belongs to them; several solvers may share it."""
+    """A setup's samples with their weights; several solvers may share it."""
 
     setup: SolverSetup
     samples: object
     region: np.ndarray | None  # weights of the samples
     masses: np.ndarray | None
-    rest: np.ndarray | None = None  # (k, 3) vertices of the implicit surface, where that is moved
+    rest: np.ndarray | None = None  # (k, 3) vertices of the implicit surface, if that is moved
     topology: Topology | None = None
 
 
@@ -60,7 +60,7 @@ def sampled(setup, count=None, seed=0):
 
 
 def at_samples(setup, weights, samples):
-    """Weights of the vertices taken to the samples."""
+    """Vertex weights interpolated at the samples."""
     if weights is None:
         return None
     return vertex_groups.at_points(setup.surface.vertices, weights, samples.points)

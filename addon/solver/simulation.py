@@ -1,26 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A source frame by frame; with secondary motion each goes on from the whole frame before it.
+"""Solves a source frame by frame; with secondary motion each frame is a time step from a whole one before.
 
-At the start frame, and before it, the source is at rest where its handles are. Every frame after is one step
-from the last whole one, so that frames in between change nothing, and live mode and bakes make the same bits.
+Up to the start frame, shapes are solved from rest. Each later frame is one time step from the last whole
+frame, so that subframes have no effect on later frames, and live mode and bakes agree bit for bit.
 """
 
 from math import ceil
 from typing import Any, NamedTuple
 
-GAP = 12  # frames that playback may drop and still go on from the last one that was seen
+GAP = 12  # longest time step, in frames, over frames that playback has dropped
 
 
 class Moment(NamedTuple):
-    """What the next frame goes on from."""
+    """The state from which the next frame is stepped."""
 
     state: Any  # native MotionState
-    motion: Any  # SecondaryMotion, with where the source was in the world
-    is_exact: bool  # whether every frame from the start frame on led here
+    motion: Any  # SecondaryMotion, with the source's placement in the world
+    is_exact: bool  # whether every whole frame since the start frame was stepped
 
 
 class Simulation:
-    """The moments of an animation that begins at a frame; not for several threads at once."""
+    """Cache of an animation's moments from a start frame on; not thread-safe."""
 
     def __init__(self, start, fps):
         self.start, self.fps = start, fps
@@ -28,7 +28,7 @@ class Simulation:
         self.edition = 0  # how often moments were forgotten
 
     def shape(self, solver, frame, request, task=None):
-        """The shape of a frame, by a FrameSolver; kept as what later ones go on from where it is whole."""
+        """The shape of a frame, solved by a FrameSolver; caches the moment of a whole frame."""
         before, edition = self.before(frame), self.edition
         if before is None:
             shape, is_exact = solver.solve_from_rest(request, task), frame <= self.start
@@ -42,7 +42,7 @@ class Simulation:
         return shape
 
     def before(self, frame):
-        """The frame that this one goes on from; None where it begins at rest."""
+        """The frame from which this one is stepped; None if it begins at rest."""
         if frame <= self.start:
             return None
         last = ceil(frame) - 1
@@ -50,21 +50,21 @@ class Simulation:
         return next((one for one in range(last, first - 1, -1) if one in self.moments), None)
 
     def could_be_exact(self, frame):
-        """Whether every frame that leads to this one is there, or it is one at rest."""
+        """Whether the moment before this frame is cached and exact, or the frame is solved from rest."""
         before = self.before(frame)
         return frame <= self.start or (
             before is not None and frame - before <= 1 and self.moments[before].is_exact
         )
 
     def forget(self, frame):
-        """That frame and all after it: the animation was edited there."""
+        """Drops the moments of that frame and all later ones, after an edit of the animation."""
         self.edition += 1
         for one in [one for one in list(self.moments) if one >= frame]:
             del self.moments[one]
 
 
 class Poses:
-    """Frames without secondary motion, each from rest: one in which nothing moves is that before it."""
+    """Frames without secondary motion, solved from rest; a request like the last one reuses its shape."""
 
     last = None  # Shape
 

@@ -24,7 +24,7 @@ from .frame_range import involved
 from .request import Request, StyleTerm
 from .setup import SolverSetup, energy_weights
 
-PREVIEW_CELLS = 96  # at most, of the implicit surface that is moved
+PREVIEW_CELLS = 96  # highest resolution of an implicit surface to move
 
 
 class SourceChanged(UserError):
@@ -36,9 +36,9 @@ class SourceChanged(UserError):
 
 
 class SourceReader:
-    """The surface is read at once; `read_setup` reads the vertex groups, which may take a while.
+    """Reads the surface in the constructor; `read_setup` reads the vertex groups, which may take a while.
 
-    `in_place`: whether the shape at the modifier's place is worked on, rather than all that is shown.
+    `in_place`: whether the mesh is read at the field modifier's place in the stack, not after all modifiers.
     """
 
     def __init__(self, context, source, kind, in_place):
@@ -51,7 +51,7 @@ class SourceReader:
         )
         self.moves_by_itself = in_place and has_motion_before(source, in_place)
         self.fingerprint = mesh_arrays.fingerprint(source.data)
-        self.points = self.surface.local  # where the modifiers before have them now
+        self.points = self.surface.local  # (n, 3) after the modifiers before the field
         self.handles, self.setup = [], None
         if not is_at_hand:
             self.read_points(context, source)
@@ -85,27 +85,27 @@ class SourceReader:
         )
 
     def read_handles(self, source, weights=None):
-        """The handles at rest; `weights` are those of the vertex groups, where any of them needs one."""
+        """Reads the handles at rest; `weights`: {vertex group: weights}, if any handle has one."""
         for entry in empties.used(source):
             movers.follow_rename(entry)
         handles = empties.solve_handles(source, self.surface.space, weights, place_of)
         self.handles = [replace(handle, target=handle.rest) for handle in handles]
 
     def read_points(self, context, source):
-        """Where the modifiers before have the points now: the field is evaluated there."""
+        """Reads the points after the modifiers before the field, where the field is evaluated."""
         points = points_now(context, source, self.surface)
         if not np.array_equal(points, self.points):
             self.points = points
 
     def refresh_carried(self, context):
-        """Reads again what of the carried objects may have been edited."""
+        """Reads carried objects that may have been edited."""
         try:
             self.carrying.refresh(context)
         except Reshaped:
             raise SourceChanged(self.reference.name) from None
 
     def request(self, context, rendered=None):
-        """The Request of the present handles and settings; `rendered`: as a render's depsgraph has them."""
+        """The Request of the present handles and settings; `rendered`: read from a render's depsgraph."""
         source = seen = self.reference.get()
         if rendered is not None:
             seen = source.evaluated_get(rendered)
@@ -131,8 +131,8 @@ class SourceReader:
 
 
 def place_of(item, bone="", rendered=None):
-    """(4, 4) where an object is, or its posed bone, maybe as a render has it. What grows from nothing is flat
-    at some frames: it counts as of full scale there."""
+    """(4, 4) world matrix of an object or its pose bone, from a render's depsgraph if given. An animated
+    scale may be zero at some frames: full scale replaces it there."""
     matrix = empties.matrix_of(item if rendered is None else item.original.evaluated_get(rendered), bone)
     return unflattened(matrix) if item.type != "EMPTY" and not bone and is_animated(item) else matrix
 
@@ -145,7 +145,7 @@ def style_term(settings, space, where):
 
 
 def read_at_rest(context, source, kind, in_place, output=None, **further):
-    """(the surface at rest, whether that is the one at hand). `further`: of read_surface."""
+    """(the surface at rest, whether it is the current frame's). `further`: arguments of read_surface."""
     frame = rest_frame(source, kind, in_place, output)
     frame = None if frame == context.scene.frame_current else frame
     with unkeyed.kept(context, [] if frame is None else involved(source, kind)):
@@ -153,7 +153,7 @@ def read_at_rest(context, source, kind, in_place, output=None, **further):
 
 
 def points_now(context, source, surface):
-    """(n, 3) where the modifiers before have the points of a surface at the frame at hand."""
+    """(n, 3) points of a surface after the modifiers before the field, at the current frame."""
     with modifier_stack.evaluated_mesh(context, source, surface.in_place) as mesh:
         points = mesh_arrays.positions(mesh)
     if len(points) != len(surface.local):
@@ -170,8 +170,8 @@ def uses_handles(settings, kind):
 
 
 def rest_frame(source, kind, in_place, output=None):
-    """The frame at which handles were placed on a surface that may move: its shape there is the one at rest,
-    wherever the scene is. None where the shape at hand is. `output`: another than the object's setting."""
+    """The frame of the rest shape, for a surface that may move: the one at which its handles were placed.
+    None if the current frame's shape is the rest shape. `output` overrides the object's setting."""
     settings = settings_of(source)
     if (
         (output or settings.output) != "WARP"
@@ -184,5 +184,5 @@ def rest_frame(source, kind, in_place, output=None):
 
 
 def has_motion_before(source, in_place):
-    """Whether the points that are worked on may move without an edit of the mesh."""
+    """Whether modifiers before the field, or shape keys, may move the points without an edit of the mesh."""
     return bool(modifier_stack.shown_before(source, in_place) or shape_keys_of(source.data))

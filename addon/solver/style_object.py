@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh object as a style: the map that the library reads off it, kept while the object stays as it is."""
+"""A mesh object as a style: its native ObjectStyle, cached by a fingerprint of mesh and matrix."""
 
 import bmesh
 import bpy
@@ -11,13 +11,13 @@ from ..core.errors import UserError
 from ..core.runtime import native
 from ..handles.empties import matrix_of
 
-MOST_NORMALS = 64  # of an object without a volume; more are no preference
-KEPT = 8  # objects, or placings of one, whose styles are remembered
+MOST_NORMALS = 64  # face normals of an object without a volume; with more it is no style
+KEPT = 8  # size of the cache: objects, or orientations of one
 cache = {}  # key → ObjectStyle or (k, 3) normals
 
 
 def refusal(item):
-    """The UserError of an object that can be no style, as far as it is seen without reading; else None."""
+    """UserError if an object cannot be a style, without reading its mesh; else None."""
     if item.type != "MESH":
         return UserError("{name} is no mesh; a mesh object is needed as a style", item)
     return None
@@ -25,7 +25,7 @@ def refusal(item):
 
 def style_of(item, where=matrix_of):
     """(style, key): an ObjectStyle in the world's directions, or the (k, 3) face normals of an object without
-    a volume; equal keys for equal styles. UserError that names the object where it gives neither."""
+    a volume; equal keys for equal styles. UserError that names the object if it gives neither."""
     reason = refusal(item)
     if reason is not None:
         raise reason
@@ -60,7 +60,7 @@ def _read(name, mesh, linear):
 
 
 def _closed(points, corners):
-    """The same with what lies at one place as one, and its holes filled."""
+    """The mesh with coincident vertices merged and its holes filled."""
     points, which = np.unique(points, axis=0, return_inverse=True)
     closed = bmesh.new()
     vertices = [closed.verts.new(point) for point in points]
@@ -80,7 +80,7 @@ def _closed(points, corners):
 
 
 def _face_normals(name, mesh, linear):
-    """(k, 3) different unit normals of the faces in the world."""
+    """(k, 3) distinct unit normals of the faces, in world space."""
     normals = np.empty(3 * len(mesh.polygons), dtype=np.float32)
     mesh.polygons.foreach_get("normal", normals)
     turned = normals.reshape(-1, 3).astype(np.float64) @ np.linalg.pinv(linear)  # by the inverse transpose

@@ -18,8 +18,8 @@ from . import style_object
 
 @dataclass(frozen=True)
 class Style:
-    """A native style's name, (k, 3) normals or an ObjectStyle; its (3, 3) turn into solve space; what is up
-    there; and what is equal for equal styles before the turn."""
+    """`normals`: a native style's name, (k, 3) normals or an ObjectStyle; `turn`: (3, 3) rotation into solve
+    space; `up`: (3,) there; `identity`: a key, equal for equal styles before the rotation."""
 
     normals: object
     turn: np.ndarray
@@ -37,7 +37,7 @@ class Style:
 
 
 def refusal(source):
-    """Why the style that an object's settings ask for cannot be had, as a UserError; None where it can."""
+    """UserError that says why an object's settings give no style; else None."""
     settings = settings_of(source)
     style = settings.stylize
     held = empties.require_handles(source) if style.use_handles else None
@@ -46,14 +46,14 @@ def refusal(source):
 
 
 def is_begun(source):
-    """Whether the object or the handle that the settings ask for is still to be chosen."""
+    """Whether the user still has to choose the object or the handle that the settings need."""
     settings = settings_of(source).stylize
     lacks_handle = settings.use_handles and not empties.used(source)
     return lacks_handle or missing_object(settings.style, settings.frame, settings) is not None
 
 
 def missing_object(which, frame, settings):
-    """The UserError of a style, or of axes, for which no object is chosen; None where there is one."""
+    """UserError if a style, or its axes, need an object that is not chosen; else None."""
     if which in CUSTOM:
         if settings.style_object is None:
             return UserError("Choose the object that gives the style its normals")
@@ -65,7 +65,7 @@ def missing_object(which, frame, settings):
 
 
 def requested_style(settings, space, operator=None, where=matrix_of):
-    """The style of an object's settings (and the operator's arguments, where given)."""
+    """The Style of an object's settings, overridden by the operator's arguments if given."""
 
     def setting(name):
         return effective_value(name, settings, operator)
@@ -99,7 +99,7 @@ def axes(which, space, item, where=matrix_of):
 
 
 def group_names(source, settings):
-    """The vertex groups that a stylization asks for."""
+    """The vertex groups that a stylization uses."""
     held = empties.group_names(source) if settings.use_handles else []
     return [*held, settings.region] if settings.region else held
 
