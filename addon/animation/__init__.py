@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses over time, baked."""
+"""Bakes and exports of animations."""

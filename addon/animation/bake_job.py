@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes of several objects in one pass over the frames: the main thread plays and reads them, the worker
-solves and writes them, neither holding more than a few."""
+"""Bakes of several objects in one pass over the frames: the main thread plays the scene and reads requests,
+the worker solves them and writes the shapes. Few requests are in memory at once."""
 
 import contextlib
 
@@ -11,14 +11,14 @@ from ..core.runtime.jobs import Item
 from ..core.runtime.progress import JobCancelled
 from .frames import FrameFeed, playing
 
-AHEAD = 8  # frames that are read before they are solved, where each has positions of its own
+AHEAD = 8  # most frames read ahead of the worker, if each request has point positions of its own
 
 
 class BakePass:
     """The bakes (object_bake.ObjectBake), all of the same frames.
 
-    Requests of handles alone are small: the frames are then played at once, and the scene is back where it
-    was while the worker goes on.
+    Requests with handles only are small: all frames are then played at once, and the scene is back at its
+    frame while the worker solves.
     """
 
     def __init__(self, bakes, frames):
@@ -33,7 +33,7 @@ class BakePass:
         return Item(names, self.work, lambda _: self.place(context, job, failures))
 
     def play(self, context, job):
-        """Coroutine that plays the frames and notes what each asks for; the scene ends where it was."""
+        """Coroutine that plays the frames and queues the requests of each; restores the frame at the end."""
         with contextlib.closing(self.feed), playing(context.scene) as show:
             for frame in self.played:
                 while self.feed.is_full and not job.done:
@@ -45,7 +45,7 @@ class BakePass:
                 yield Pause.REDRAW
 
     def work(self, tracker):
-        """On the worker."""
+        """Solves and stores all frames; on the worker."""
         count, baked = len(self.played), set(self.frames)
         try:
             for bake in self.bakes:
@@ -67,7 +67,7 @@ class BakePass:
             raise
 
     def place(self, context, job, failures):
-        """Coroutine: what was baked is put in its place, once all is ready; returns the line to report."""
+        """Coroutine: once all bakes are ready, puts caches and keys in place; returns the line to report."""
         lines = []
         for bake in self.bakes:
             yield from self.unless_it_fails(bake, bake.ready(context, job), failures)
@@ -81,7 +81,7 @@ class BakePass:
         return ", ".join(lines)
 
     def unless_it_fails(self, bake, coroutine, failures):
-        """Coroutine: the result of another; None where the bake has failed, which is told once."""
+        """Coroutine: the result of `coroutine`; None if the bake has failed, which is reported once."""
         if bake not in self.failed:
             try:
                 if bake.error is not None:
@@ -93,11 +93,11 @@ class BakePass:
         return None
 
     def discard(self):
-        """Removes what is not in its place."""
+        """Removes caches that are not in place."""
         for bake in self.bakes:
             bake.discard()
 
     def discard_keys(self):
-        """The same of shape keys; on the main thread."""
+        """Removes shape keys that are not in place; on the main thread."""
         for bake in self.bakes:
             bake.store.discard_item()

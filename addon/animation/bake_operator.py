@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What baking and exporting share: the scene plays on the main thread while a worker solves."""
+"""Base of the bake and export operators: the scene plays on the main thread while a worker solves."""
 
 import contextlib
 
@@ -21,9 +21,9 @@ SETTINGS = ("format", "kind", "range", "step", "subframes", "loop")
 
 
 class BakeOperator(JobOperator):
-    """Mixin of operators that solve frames, and play the scene while a worker does.
+    """Mixin of operators that play the scene while a worker solves its frames.
 
-    A subclass has `places(context)`: {path of a file that it writes: whether that is the object's own}.
+    A subclass has `places(context)`: {path of a file to write: whether that file is the object's own}.
     """
 
     overwrite: flag("Overwrite", "Replace a file without a question", options={"HIDDEN", "SKIP_SAVE"})
@@ -32,14 +32,14 @@ class BakeOperator(JobOperator):
     def refuses(cls, source):
         return refusal_of(source, effective_kind(source))
 
-    frames_pass = None  # BakePass, where frames are solved
+    frames_pass = None  # BakePass, if frames are solved
     covered = ()  # ObjectReferences of sources whose earlier results became layers
     used = SETTINGS
 
     def invoke(self, context, event):
         taken = []
         if has_window() and not self.overwrite:
-            with contextlib.suppress(UserError, OSError):  # which the job tells
+            with contextlib.suppress(UserError, OSError):  # the job reports it
                 taken = [path for path, own in self.places(context).items() if path.exists() and not own]
         if not taken:
             return super().invoke(context, event)
@@ -47,7 +47,7 @@ class BakeOperator(JobOperator):
         return {"CANCELLED"}
 
     def prepare(self, context, job):
-        """Coroutine: the job's items by `plan_frames(context, job)`; what cannot be planned is a failure."""
+        """Coroutine: the job's items by `plan_frames(context, job)`; an error goes to `failures`."""
         try:
             return (yield from self.plan_frames(context, job))
         except (UserError, ValueError, OSError) as error:
@@ -60,7 +60,7 @@ class BakeOperator(JobOperator):
 
     def clear_up(self, job):
         for source in filter(None, (reference.find() for reference in self.covered)):
-            layers.uncover(source)  # where no cache plays over it
+            layers.uncover(source)  # unless a cache plays
         if self.frames_pass is not None:
             self.frames_pass.feed.close()
             job.cancel()
@@ -69,7 +69,7 @@ class BakeOperator(JobOperator):
             self.frames_pass.discard_keys()
 
     def values(self, source):
-        """The settings by name; `start` and `end` where they were given or the range is one's own."""
+        """The settings by name; `start` and `end` only if given, or if the range is CUSTOM."""
         group = settings_of(source).bake
         values = {name: effective_value(name, group, self) for name in self.used}
         for name in ("start", "end"):
@@ -83,8 +83,8 @@ class BakeOperator(JobOperator):
         return frames.choose(context, sources, values)
 
     def begin(self, context, job, sources, values, bakes_of):
-        """Coroutine: reads the sources, (object, kind), each made an ObjectBake by `bakes_of(source, kind,
-        frames)`; the job's items."""
+        """Coroutine: reads the sources, (object, kind), each as an ObjectBake by `bakes_of(source, kind,
+        frames)`; returns the job's items."""
         chosen, bakes, self.covered = self.choose(context, sources, values), [], []
         for source, kind in sources:
             reason = refusal_of(source, kind)
@@ -106,7 +106,7 @@ class BakeOperator(JobOperator):
 
 
 def ask(context, operator, paths):
-    """A menu whose button runs the operator again, with the same arguments, and overwrites."""
+    """Pops up a menu whose button runs the operator again with the same arguments and `overwrite`."""
     given = arguments(operator) | {"overwrite": True}
     names = ", ".join(path.name for path in paths)
 
@@ -121,7 +121,7 @@ def ask(context, operator, paths):
 
 
 def arguments(operator):
-    """{name: value} of what an operator was given."""
+    """{name: value} of the arguments that an operator was given."""
     chosen, own = operator.properties, operator.properties.bl_rna.properties
     own = [one.identifier for one in own if not one.is_readonly and chosen.is_property_set(one.identifier)]
     return {name: getattr(chosen, name) for name in own}
@@ -132,7 +132,7 @@ def effective_kind(source, operator=None):
 
 
 def refusal_of(source, kind):
-    """Why there is nothing to bake of a source, as a UserError; None where there is."""
+    """UserError that says why a source has nothing to bake; else None."""
     if holds_splats(source):
         return UserError(
             "{name} holds splats; render them live, or write a PLY a frame by arapfields animate",

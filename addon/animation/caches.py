@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the frames of a bake go, and what they weigh."""
+"""Stores for the frames of a bake, cache files or shape keys, and their sizes."""
 
 import contextlib
 import os
@@ -15,24 +15,24 @@ from ..field_modifier import cache_modifier
 from ..results import result_objects
 
 SUFFIXES = {"PC2": ".pc2", "MDD": ".mdd"}
-BARRED = re.compile(r'[\x00-\x1f/\\:*?"<>|]')  # letters that a file's name cannot have
-HEAVY = 500e6  # bytes of shape keys, above which a cache would serve better
+BARRED = re.compile(r'[\x00-\x1f/\\:*?"<>|]')  # characters that file names cannot have
+HEAVY = 500e6  # bytes of shape keys above which a cache is recommended
 
 
 class ShapeKeys:
     """The frames of one object, kept in memory for its shape keys."""
 
     def __init__(self):
-        self.shapes, self.item = [], None  # item: an object that no scene has, with the keys
+        self.shapes, self.item = [], None  # item: an object in no scene, with the keys
 
     def open(self, solver):
-        """Before the first frame; on the worker, as all but `commit`."""
+        """Called before the first frame; on the worker, as all methods but `commit`."""
 
     def add(self, points):
         self.shapes.append(points)
 
     def finish(self):
-        """After the last frame."""
+        """Called after the last frame."""
 
     def discard(self):
         self.shapes.clear()
@@ -44,36 +44,36 @@ class ShapeKeys:
             text = translated("Storing frame {frame}", frame=frame)
             job.report_main_thread(number / len(names), text)
             result_objects.add_frame(self.item, names, number, self.shapes[number])
-            self.shapes[number] = None  # the key has it
+            self.shapes[number] = None  # stored in the key
             yield Pause.REDRAW
 
     def forget(self):
-        """Another object has the mesh now."""
+        """Removes the temporary object; another one has its mesh."""
         bpy.data.objects.remove(self.item)
         self.item = None
 
     def discard_item(self):
-        """Removes what no other object has; on the main thread."""
+        """Removes the temporary object with its mesh; on the main thread."""
         if self.item is not None:
-            with contextlib.suppress(ReferenceError):  # the file was left
+            with contextlib.suppress(ReferenceError):  # another file was loaded
                 result_objects.discard(self.item)
 
 
 class CacheFile:
-    """The frames of one object in a point cache, which takes its place when it is committed."""
+    """The frames of one object in a point cache file, which `commit` moves to its final path."""
 
     def __init__(self, path, frames, fps):
         self.path, self.frames, self._fps = path, frames, fps
         self._writer = None
 
     def discard_item(self):
-        """There is none."""
+        """Does nothing: there is no temporary object."""
 
     def open(self, solver):
         self.open_for(len(solver.rest))
 
     def open_for(self, points):
-        """For so many points."""
+        """Opens the writer for that number of points."""
         from arapfields.point_cache import PointCacheWriter
 
         frames, times = self.frames, {"start": self.frames.start, "step": self.frames.step, "fps": self._fps}
@@ -86,24 +86,24 @@ class CacheFile:
         self._writer.finish()
 
     def commit(self):
-        """Puts the cache in its place; on the main thread."""
+        """Moves the cache to its final path; on the main thread."""
         try:
             self._writer.commit()
         except OSError as error:
             raise as_user_error(error) from error
 
     def discard(self):
-        """Removes what is not in its place; the cache of an earlier bake stays as it is."""
+        """Removes an uncommitted cache; that of an earlier bake stays."""
         if self._writer is not None:
             self._writer.discard()
 
     def play_on(self, item):
-        """Has an object play the cache."""
+        """Adds the modifier that plays the cache to an object."""
         cache_modifier.play(item, shown_path(self.path), self.frames.start, self.frames.step)
 
 
 def cache_path(source, suffix, folder, filepath=""):
-    """The absolute path of an object's cache; UserError where none can be."""
+    """The absolute path of an object's cache; UserError if it cannot be used."""
     name = BARRED.sub("_", source.name)
     shown = filepath or f"{folder.rstrip('/') or '/'}/{name}{suffix}"
     if shown.startswith("//") and not bpy.data.filepath:
@@ -119,20 +119,20 @@ def cache_path(source, suffix, folder, filepath=""):
 
 
 def cache_beside(path, name):
-    """The same as cache_path, of an object that goes along: beside the other's cache, with both names."""
+    """The path of a carried object's cache: beside the source's cache, with both names."""
     return path.with_name(f"{path.stem} {BARRED.sub('_', name)}{path.suffix}")
 
 
 def shown_path(path):
-    """A cache's path as its modifier has it: from where the .blend lies by now."""
+    """A cache's path for its modifier: relative to the saved .blend where possible."""
     if bpy.data.filepath:
         with contextlib.suppress(ValueError):  # on another drive
-            return bpy.path.relpath(str(path)).replace(os.sep, "/")  # as other systems read it, too
+            return bpy.path.relpath(str(path)).replace(os.sep, "/")  # readable on every system
     return str(path)
 
 
 def plain(frame):
-    """A whole frame as an integer, which is how keys are named."""
+    """The frame as an integer if it is whole, else rounded: used in the names of keys."""
     return int(frame) if frame == int(frame) else round(frame, 4)
 
 
@@ -142,7 +142,7 @@ def keys_weight(points, frames):
 
 
 def size_text(count):
-    """Bytes as people read them."""
+    """A number of bytes in GB, MB or kB."""
     for unit, size in (("GB", 1e9), ("MB", 1e6)):
         if count >= size:
             return f"{count / size:.1f} {unit}"

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes of what a source carries, beside the source's own: caches, shape keys, or keyframes.
+"""Bakes of a source's carried objects: caches, shape keys, or keyframes.
 
-Meshes go as the source goes: into a cache of their own, or into an object with a key a frame. So do hair,
-point clouds and Grease Pencil, by a mesh of their points. Curves and lattices get a shape key a frame, whole
-objects and bones keyframes.
+Meshes are baked as their source is: to a cache of their own, or to an object with a shape key per frame. So
+are hair, point clouds and Grease Pencil, by a mesh of their points. Curves and lattices get a shape key per
+frame; rigid objects and bones get keyframes.
 """
 
 import contextlib
@@ -34,7 +34,8 @@ from .frames import playing
 
 
 class CarriedBake:
-    """Given the shapes of each frame in turn by the worker; placed on the main thread.
+    """Receives the shapes of each frame in turn on the worker; placed on the main thread.
+
 
     `cache_of(name)` is the path of an object's cache; None for shape keys.
     `is_shared`: other processes solve other frames, of the source alone.
@@ -42,7 +43,7 @@ class CarriedBake:
 
     def __init__(self, carrying, frames, cache_of, fps, is_shared):
         self.carrying, self.frames, self.warnings = carrying, frames, []
-        self.shapes, self.caches, self.keyed = {}, {}, {}  # by carried object; keyed: a snapshot a frame
+        self.shapes, self.caches, self.keyed = {}, {}, {}  # by carried object; keyed: snapshots per frame
         if carrying.nodes is not None:
             name = carrying.source.name
             self.warnings.append(UserError("The field of {name} as nodes is not baked: it stands", name=name))
@@ -59,7 +60,7 @@ class CarriedBake:
             cache.open_for(len(carried.carrier.points))
 
     def add(self, shapes):
-        """Takes what one frame's shape carries; on the worker."""
+        """Stores the carried objects' shapes of one frame; on the worker."""
         for carried, shape in shapes:
             if carried is self.carrying.nodes:
                 continue
@@ -78,12 +79,12 @@ class CarriedBake:
         self.shapes.clear()
 
     def read_keyframes(self, context, source, job):
-        """Coroutine: plays the frames and notes what deltas and poses are to be keyed, over what the objects'
-        own animation gives; all stay as they are."""
+        """Coroutine: plays the frames and records the delta transforms and poses to key, on top of the
+        objects' own animation; restores the objects afterwards."""
         bound = {}
         for carried, shapes in self.shapes.items():
             if isinstance(carried.carrier, PoseCarrier) and len(shapes) == self.frames.count:
-                with contextlib.suppress(UserError):  # which is told where it is placed
+                with contextlib.suppress(UserError):  # reported by `place`
                     found = carried.item_and_entry(source)
                     bound[carried] = *found, carried.carrier.snapshot(*found)
         if not bound:
@@ -105,7 +106,7 @@ class CarriedBake:
                     carried.carrier.restore(item, entry, before)
 
     def place(self, context, source):
-        """Coroutine: puts all in their places; one that cannot take its motion is named."""
+        """Coroutine: adds caches, keys and keyframes to the objects; reports those that cannot take them."""
         for carried in self.carrying.objects:
             try:
                 item, entry = carried.reference.get(), find(source, carried.reference.get())
@@ -151,7 +152,7 @@ class CarriedBake:
             yield Pause.REDRAW
 
     def add_keys(self, carried, item):
-        """A shape key a frame, in place of those of an earlier bake."""
+        """Adds a shape key per frame; removes those of an earlier bake."""
         mask = own_key(item).vertex_group if own_key(item) is not None else ""
         forget_baked_keys(item)
         drop_key(item, also_basis=False)
@@ -171,7 +172,7 @@ class CarriedBake:
         turns = {}
         if not isinstance(carried.carrier, BonesCarrier):
             forget_baked(item)
-        with playing(context.scene):  # which shows the present frame's keys at last
+        with playing(context.scene):  # at its end, the current frame's keys show
             for frame, state in zip(self.frames, self.keyed[carried], strict=True):
                 carried.carrier.restore(item, entry, state)
                 insert(item, carried.carrier, frame, turns)
@@ -179,7 +180,7 @@ class CarriedBake:
 
 
 def remove(item, entry):
-    """Takes off a carried object what plays its bake; keys of bones stay."""
+    """Removes the modifier, shape keys or F-curves of a carried object's bake; keyframes of bones stay."""
     kind = carrier_class(item, entry.way)
     if item.type == "MESH" and modifier_stack.find_cache(item) is not None:
         cache_modifier.remove(item)
@@ -193,8 +194,8 @@ def remove(item, entry):
 
 
 def insert(item, carrier, frame, turns):
-    """Keyframes of what a carrier has written. `turns`: {(owner's name, channel): its rotation at the frame
-    before}, which this one goes on from, so that none turns the long way round between frames."""
+    """Keyframes the channels that a carrier has written. `turns`: {(owner's name, channel): its rotation at
+    the last frame}, with which each rotation is made compatible, to avoid flips between frames."""
     euler, quaternion = "rotation_euler", "rotation_quaternion"
     if not isinstance(carrier, BonesCarrier):
         turned = quaternion if item.rotation_mode == "QUATERNION" else euler

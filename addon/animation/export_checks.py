@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether an exported animation is whole: Blender's exporters are silent on a full disk. Without bpy."""
+"""Checks that an exported file is complete, as Blender's exporters do not report a full disk. Without bpy."""
 
 import struct
 
 
 def is_whole(path, kind):
-    """Whether the file of that kind (ABC, USD or GLTF) has the beginning and the length of a finished one."""
+    """Whether the file of that kind (ABC, USD or GLTF) has the header and the length of a complete one."""
     try:
         size = path.stat().st_size
         with path.open("rb") as file:
@@ -15,7 +15,7 @@ def is_whole(path, kind):
 
 
 def _ogawa(file, size):
-    """Alembic's container: its sixth byte says that it was closed, and where its root lies stands after."""
+    """Alembic's Ogawa container: byte 5 is 0xFF once it was closed, bytes 8 to 15 are the root's offset."""
     magic, closed, _, root = struct.unpack("<5sBHQ", file.read(16))
     return magic == b"Ogawa" and closed == 0xFF and root + 8 <= size
 
@@ -34,6 +34,6 @@ def _crate(file, size):
 
 
 def _binary_gltf(file, size):
-    """A .glb says how long it is."""
+    """A .glb stores its length in the header."""
     magic, version, length = struct.unpack("<4sII", file.read(12))
     return magic == b"glTF" and version == 2 and length == size

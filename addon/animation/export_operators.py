@@ -48,7 +48,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
     asked = False  # whether a file was chosen in the dialog
 
     def invoke(self, context, event):
-        """Asks for the file where none is named; then begins as from a script."""
+        """Opens the file browser if no path is given; then runs as from a script."""
         if self.filepath or not has_window():
             return super().invoke(context, event)
         suffix = exporters.SUFFIXES[self.format]
@@ -65,13 +65,13 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         return {"FINISHED"}
 
     def cancel(self, context):
-        """No file was chosen, or the job's window closes."""
+        """Called if no file was chosen, or if the job's window closes."""
         if not self.asked:
             super().cancel(context)
 
     @classmethod
     def refuses(cls, source):
-        """What plays a cache is exported as it is; what does not is solved first."""
+        """An object that plays a cache is exported as it is; others are solved first."""
         return None if cache_modifier.is_playing(source) else super().refuses(source)
 
     def places(self, context):
@@ -91,7 +91,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         return (yield from self.plan(context, job, path, unsolved))
 
     def is_unsolved(self, source):
-        """Whether a source must be solved first; UserError where its cache does not fit."""
+        """Whether a source must be solved first; UserError if its cache does not fit it."""
         if not cache_modifier.is_playing(source):
             return refusal_of(source, effective_kind(source, self)) is None
         reason = played.problem(source, look_closely=True)
@@ -115,7 +115,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         return [Item(names, items[0].work, lambda _: self.export(context, job, path))]
 
     def export(self, context, job, path):
-        """Coroutine: what was solved plays for as long as the exporter runs; then all is as it was."""
+        """Coroutine: plays the solved caches while the exporter runs, then restores the objects."""
         with contextlib.ExitStack() as stack:
             shown = {reference.uid: reference.get() for reference in self.items}
             for bake in self.frames_pass.bakes if self.frames_pass is not None else ():
@@ -131,7 +131,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         )
 
     def play(self, context, bake, stack):
-        """The object that plays a bake until the stack is left."""
+        """The object that plays a bake until the ExitStack is closed."""
         source = bake.unchanged_source()
         bake.store.commit()
         player = source

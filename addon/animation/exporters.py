@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Animated objects to files, by Blender's own exporters: what is shown of them at every frame."""
+"""Exports the evaluated objects of every frame by Blender's own exporters."""
 
 import contextlib
 import shutil
@@ -29,7 +29,7 @@ def is_missing(kind):
 
 
 def write(context, kind, path, items, frames):
-    """Coroutine: writes these objects' frames, all of it or nothing; UserError that names the file."""
+    """Coroutine: writes these objects' frames to a complete file, or none; UserError that names the file."""
     from arapfields._files import whole_file
 
     # USD's textures are found by paths relative to its own folder.
@@ -59,7 +59,7 @@ def write(context, kind, path, items, frames):
 
 
 def require_room(context, path, items, frames):
-    """UserError where the disk has no room for the frames: Alembic's writer would take Blender down."""
+    """UserError if the disk has too little space for the frames: Alembic's writer would crash Blender."""
     need, samples = 1e6, frames.count + (count_of("ABC", frames) if frames.step > 1 else 0)
     for item in items:
         mesh = item.evaluated_get(updated(context.view_layer)).data
@@ -123,13 +123,13 @@ def count_of(kind, frames):
 
 
 class MorphingCopy:
-    """An object whose shape keys are the frames of another, moved as that one moves."""
+    """A copy of an object, with its motion, whose shape keys are the original's frames."""
 
     def __init__(self, context, item):
         self.context, self.source, self.item, self.action = context, item, None, None
 
     def add(self, frames):
-        """Coroutine that plays the frames; the scene ends where it was."""
+        """Coroutine that plays the frames and adds their keys; then restores the scene's frame."""
         keys = []
         with playing(self.context.scene) as show:
             for number, frame in enumerate(frames):
@@ -170,7 +170,7 @@ class MorphingCopy:
         return key
 
     def animate(self, keys, frames):
-        """Each key at full value at its frame, and at none at its neighbours, in straight lines."""
+        """Keyframes each key with 1 at its frame and 0 at the frames beside it, with linear interpolation."""
         for number, key in enumerate(keys):
             for at in range(max(0, number - 1), min(len(frames), number + 2)):
                 key.value = float(at == number)
@@ -191,8 +191,8 @@ class MorphingCopy:
 
 @contextlib.contextmanager
 def scene_kept(context):
-    """What is selected and active, and the frame, are so again after the block: an exporter that fails
-    leaves them as they come."""
+    """Restores selection, active object and frame after the block: an exporter that fails leaves them
+    changed."""
     layer, scene = context.view_layer, context.scene
     frame, subframe = scene.frame_current, scene.frame_subframe
     chosen, active = [item.name for item in context.selected_objects], layer.objects.active
@@ -208,7 +208,7 @@ def scene_kept(context):
 
 
 def select(context, items):
-    """Selects these objects alone; UserError names one that is hidden and so would be left out."""
+    """Selects these objects alone; UserError if one is hidden, as exporters would leave it out."""
     for item in context.view_layer.objects:
         item.select_set(False)
     for item in items:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which frames are baked, and how they come from the main thread, which reads them, to the worker."""
+"""The frames to bake, and the queue that passes their requests from the main thread to the worker."""
 
 import contextlib
 import queue
@@ -11,7 +11,7 @@ from ..core.errors import UserError
 from ..core.runtime.progress import JobCancelled
 from ..solver import frame_range
 
-NOISE = 1e-3  # of a keyframe's place, in frames
+NOISE = 1e-3  # rounding error of a keyframe's position, in frames
 
 
 @dataclass(frozen=True)
@@ -30,15 +30,15 @@ class Frames:
         return self.start + (self.count - 1) * self.step
 
     def with_those_before(self, start):
-        """The frames and every whole one from `start` on that leads to them, in order."""
+        """The frames and all whole ones from `start` to the last, in order."""
         last = int(self.last)
         return sorted({*self, *map(float, range(min(start, last), last + 1))})
 
 
 def choose(context, sources, values):
-    """The Frames that the settings ask for: `sources` are (object, kind), `values` the settings by name.
+    """The Frames to bake: `sources` are (object, kind), `values` the settings by name.
 
-    `start` and `end` count where they are given, whatever the range is.
+    `start` and `end` override the range if they are given.
     """
     scene, which = context.scene, values["range"]
     first, last = values.get("start"), values.get("end")
@@ -52,7 +52,7 @@ def choose(context, sources, values):
 
 
 def animation(scene, sources):
-    """(first, last) frame of the scene that the keyframes of all that moves the sources span."""
+    """(first, last) scene frame of the animation of the sources and of what moves them."""
     spans = [span for span in (frame_range.animation_range(*one) for one in sources) if span is not None]
     if not spans:
         names = ", ".join(source.name for source, _ in sources)
@@ -63,19 +63,19 @@ def animation(scene, sources):
 
 @contextlib.contextmanager
 def playing(scene):
-    """Gives a function that takes the scene to a frame; at the end it is back where it was."""
+    """Context manager: yields a function that sets the scene's frame; restores the frame at the end."""
     present = scene.frame_current, scene.frame_subframe
     try:
         yield lambda frame: scene.frame_set(int(frame // 1), subframe=frame - frame // 1)
     finally:
-        with contextlib.suppress(ReferenceError):  # the file was left
+        with contextlib.suppress(ReferenceError):  # another file was loaded
             scene.frame_set(present[0], subframe=present[1])
 
 
 class FrameFeed:
-    """What was read of each frame, in order, at most so many frames ahead of who works on them."""
+    """Queue of the requests of each frame, in order, with a limit of frames read ahead of the worker."""
 
-    PATIENCE = 0.05  # seconds between looks whether the job was cancelled
+    PATIENCE = 0.05  # seconds between checks whether the job was cancelled
 
     def __init__(self, ahead):
         self._frames, self._is_closed = queue.Queue(ahead), False
@@ -88,11 +88,11 @@ class FrameFeed:
         self._frames.put_nowait(frame)
 
     def close(self):
-        """No more frames come: the main thread was stopped."""
+        """Called when the main thread has put the last frame, or was stopped."""
         self._is_closed = True
 
     def take(self, task):
-        """The next frame; JobCancelled where the task is cancelled first, or none comes any more."""
+        """The next frame; JobCancelled if the task is cancelled first, or if the feed is closed and empty."""
         while self._frames.empty() and not task.cancelled and not self._is_closed:
             with contextlib.suppress(queue.Empty):
                 return self._frames.get(timeout=self.PATIENCE)

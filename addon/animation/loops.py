@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes of secondary motion whose last frame is the first again."""
+"""Bakes of looping secondary motion, whose last frame equals the first."""
 
 from dataclasses import replace
 
@@ -8,15 +8,15 @@ import numpy as np
 from ..core.errors import UserError
 from ..solver.simulation import Moment
 
-ROUNDS = 12  # times that an animation is gone through at most
-# Of the size: the last frame is that near the first, and what is left, of which single steps have as much, is
-# spread over the frames.
+ROUNDS = 12  # most passes through the animation
+# Largest distance of the last frame from the first, as a share of the size. The remaining gap is distributed
+# over the frames; it is comparable to the error of a single step.
 CLOSED = 2e-3
 
 
 def solve(solver, simulation, frames, keep, task=None):
-    """Goes through the frames, [(frame, request, whether it is baked)], until the motion repeats itself; each
-    baked shape then goes to `keep`. UserError where it does not. All shapes are in memory at once."""
+    """Simulates the frames, [(frame, request, whether it is baked)], in rounds until the motion repeats; then
+    passes each baked shape to `keep`. UserError if it does not repeat. Holds all shapes in memory."""
     start, request, _ = frames[0]
     simulation.start = int(start)
     first = simulation.shape(solver, start, request, task)
@@ -41,7 +41,7 @@ def solve(solver, simulation, frames, keep, task=None):
 
 
 def comes_back(first, last, near):
-    """Whether the handles and the object itself are where they began."""
+    """Whether the handles and the object end where they started."""
     pairs = list(zip(first.targets, last.targets, strict=True))
     if first.motion is not None and last.motion is not None:
         pairs.append((first.motion.world, last.motion.world))

@@ -44,7 +44,7 @@ curves and what changes its topology as well. They follow each further solve"""
 
 
 def require_free(source, item):
-    """UserError where an object cannot have the modifier, or moves with the source already."""
+    """Raises UserError if an object cannot have the modifier, or moves with the source already."""
     if item.library is not None:
         raise UserError("{name} is linked from another file; make it local to carry it", item)
     if not hasattr(item.data, "attributes") and item.type not in ("CURVE", "FONT", "SURFACE"):
@@ -55,7 +55,7 @@ def require_free(source, item):
 
 
 def follow(item, carrier):
-    """Gives an object the modifier, unless it has it."""
+    """Adds the modifier to an object that does not have it."""
     if any(is_following(modifier, carrier) for modifier in item.modifiers):
         return
     index = modifier_stack.end(list(item.modifiers))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One object's bake: its solver, where its frames go, and what plays them at last."""
+"""One object's bake: its solver, the store of its frames, and the modifier or keys that play them."""
 
 import functools
 import json
@@ -22,11 +22,11 @@ from .caches import CacheFile, ShapeKeys, cache_beside, keys_weight, size_text
 from .carried_bake import CarriedBake
 from .parts import SharedCache
 
-STYLE_PATH = "arapfields.stylize"  # of what is keyframed of a style
+STYLE_PATH = "arapfields.stylize"  # data path of a style's F-curves
 
 
 def kind_of(source, kind):
-    """DEFORM or STYLIZE: what is baked of a source, by itself where `kind` is AUTO."""
+    """DEFORM or STYLIZE: what to bake of a source; chosen by its settings if `kind` is AUTO."""
     settings = settings_of(source)
     if kind != "AUTO":
         return kind
@@ -38,17 +38,17 @@ def kind_of(source, kind):
 
 
 class ObjectBake:
-    """Made and placed on the main thread; prepared, and given its frames, by the worker.
+    """Made and placed on the main thread; prepared and solved on the worker.
 
-    `path` is where the cache goes; None for shape keys.
-    `part`: (i, n) where n processes share the frames.
+    `path`: the cache's; None for shape keys.
+    `part`: (i, n) if n processes share the frames.
     """
 
     def __init__(self, context, source, kind, frames, path=None, part=None, loop=False):
         settings, fps = settings_of(source), secondary_motion.frame_rate(context.scene)
         self.in_place = placement.in_place(settings.output, settings.result) and path is not None
         self.poses, self.reader = Poses(), SourceReader(context, source, kind, self.in_place)
-        if not self.in_place and settings.output == "WARP":  # live mode shows the pose at hand, a bake all
+        if not self.in_place and settings.output == "WARP":  # unlike live mode, a bake needs all
             self.reader.moves_by_itself = has_motion_before(source, in_place=False)
         self.frames, self.solver, self.error, self.obstacles = frames, None, None, contact.lasting(source)
         beside = None if path is None else functools.partial(cache_beside, path)
@@ -56,7 +56,7 @@ class ObjectBake:
         self.simulation = (
             Simulation(settings.secondary.start, fps) if secondary_motion.is_used(source) else None
         )
-        self.looped = [] if loop and self.simulation is not None else None  # frames that are solved at last
+        self.looped = [] if loop and self.simulation is not None else None  # frames to solve in `finish`
         if path is None:
             self.store = ShapeKeys()
         elif part is None:
@@ -94,7 +94,7 @@ class ObjectBake:
         self.store.open(self.solver)
 
     def add(self, frame, request, is_baked=True, task=None):
-        """Solves one frame and puts it where it goes; one that is not baked may only lead to others."""
+        """Solves and stores one frame; one that is not baked is only simulated for later ones."""
         if isinstance(request, Exception):
             raise request
         if isinstance(self.store, SharedCache):
@@ -115,7 +115,7 @@ class ObjectBake:
         self.store.add(shape.points)
 
     def attempt(self, call, *given):
-        """Does a part of the work; what goes wrong ends this object's bake alone."""
+        """Calls a part of the work; an error ends this object's bake alone."""
         if self.error is not None:
             return
         try:
@@ -134,19 +134,19 @@ class ObjectBake:
         self.store.finish()
 
     def discard(self):
-        """Removes what was not put in its place; the cache of an earlier bake stays as it is."""
+        """Removes frames that were not placed; the cache of an earlier bake stays."""
         self.store.discard()
         self.carried.discard()
 
     def ready(self, context, job):
-        """Coroutine: what takes long of placing, which the user may cancel: nothing is in its place yet."""
+        """Coroutine: the slow part of placing, which the user may cancel, as no data are changed yet."""
         source = self.unchanged_source()
         yield from self.carried.read_keyframes(context, source, job)
         if isinstance(self.store, ShapeKeys):
             yield from self.store.make(self.mesh(context, source), self.frames, job)
 
     def place(self, context):
-        """Coroutine: the caches in their places and what plays them; returns the line to report."""
+        """Coroutine: commits the caches and adds what plays them; returns the line to report."""
         source = self.unchanged_source()
         place = self.place_keys if isinstance(self.store, ShapeKeys) else self.place_cache
         line = place(context, source)
@@ -166,7 +166,7 @@ class ObjectBake:
                 path=file.name,
             )
         self.store.commit()
-        sessions.end(context, source)  # what was live is baked now
+        sessions.end(context, source)  # the bake replaces the live shape
         player = source if self.in_place else self.new_object(context, source, self.mesh(context, source))
         visibility.show_alone(source, player)
         self.store.play_on(player)
@@ -189,7 +189,7 @@ class ObjectBake:
         return source
 
     def mesh(self, context, source):
-        """Of an object of its own, where the source's own vertices do not take the motion."""
+        """The mesh of a new object, for a bake that does not play on the source itself."""
         solver = self.solver
         if solver.sampled.topology is not None:
             return result_objects.surface_mesh(source, solver.to_local(solver.rest), solver.sampled.topology)
@@ -202,7 +202,7 @@ class ObjectBake:
     def place_keys(self, context, source):
         item = self.new_object(context, source, self.store.item.data)
         self.store.forget()
-        context.scene.frame_set(context.scene.frame_current)  # else the key stored last stays on
+        context.scene.frame_set(context.scene.frame_current)  # else the last key stays on
         visibility.show_alone(source, item)
         return translated(
             "{count} frames baked into shape keys of {size}",

@@ -18,7 +18,7 @@ from .wrap_bake import WrapBake, frames_of, scans_in
 
 
 class CacheOperator(BakeOperator):
-    """Mixin of operators that keep the frames: in caches, or shape keys."""
+    """Mixin of operators that store the frames in caches or shape keys."""
 
     __annotations__ = {
         "folder": folder(options={"SKIP_SAVE"}),
@@ -31,7 +31,7 @@ class CacheOperator(BakeOperator):
     }
 
     def path(self, source, active, values):
-        """As cache_path() gives it; None for shape keys."""
+        """The path by cache_path(); None for shape keys."""
         suffix = caches.SUFFIXES.get(values["format"])
         if suffix is None:
             return None

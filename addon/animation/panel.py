@@ -37,7 +37,7 @@ class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
 
 
 def weight(context, source, bake):
-    """What the frames would weigh, as far as it is known before they are read."""
+    """Text with the estimated size of the frames."""
     first, last = (bake.start, bake.end) if bake.range == "CUSTOM" else frame_range.scene_range(context.scene)
     count = max(0, (last - first) * bake.subframes // bake.step + 1)
     size = caches.size_text(caches.keys_weight(len(points_of(source.data)), count - 1))

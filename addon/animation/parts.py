@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes that several processes share. Each solves a part of the frames and keeps them beside the cache; the
-process that completes them makes the cache. A killed process's frames stay, so the next one goes on."""
+"""Bakes shared by several processes. Each solves a part of the frames and stores them beside the cache; the
+one that completes them writes the cache. Frames of a killed process stay for the next one."""
 
 import hashlib
 import time
@@ -11,7 +11,7 @@ from .caches import CacheFile
 
 
 class SharedCache(CacheFile):
-    """`part` is (i, n), the i-th of n, 1 ≤ i ≤ n; `missing`: how many frames others are still to solve."""
+    """`part` is (i, n), the i-th of n, 1 ≤ i ≤ n; `missing`: number of frames not solved yet."""
 
     def __init__(self, path, frames, fps, part):
         super().__init__(path, frames, fps)
@@ -32,7 +32,7 @@ class SharedCache(CacheFile):
         self._store = FrameStore(self.path, self._points, content)
 
     def add_request(self, solver, request):
-        """Solves a frame where it is this part's and nobody has it yet."""
+        """Solves a frame if it belongs to this part and is not stored yet."""
         number, parts = self.part
         index = len(self._places)
         place = self._store.place(index, self._key(request))
@@ -41,7 +41,7 @@ class SharedCache(CacheFile):
             self._store.put(place, solver.solve_from_rest(request).points)
 
     def _key(self, request):
-        """Arrays that tell this request from others."""
+        """Arrays that identify a request."""
         if self._digested[0] is not request.points:
             digest = hashlib.blake2b(request.points.tobytes(), digest_size=16).digest()
             self._digested = request.points, digest
@@ -54,7 +54,7 @@ class SharedCache(CacheFile):
         with self._store.alone():
             self.missing = sum(not self._store.has(place) for place in self._places)
             if self.missing and self.path.exists() and self.path.stat().st_mtime > self._began:
-                self.missing = 0  # another process has made it meanwhile
+                self.missing = 0  # another process has written it meanwhile
             elif not self.missing:
                 self.open_for(self._points)
                 for place in self._places:
@@ -63,10 +63,10 @@ class SharedCache(CacheFile):
                 self._store.remove(self._places)
 
     def commit(self):
-        """The worker has put it in its place."""
+        """Does nothing: `finish` has committed the cache on the worker."""
 
 
 def handle_bytes(handle):
-    """Bytes that stand for a handle at rest."""
+    """Bytes that identify a handle at rest."""
     parts = [handle.kind, handle.weight, handle.rest, getattr(handle, "weights", None)]
     return b"".join(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode() for part in parts)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the cache that an object plays is there and still fits it."""
+"""Checks that the cache that an object plays exists and still fits it."""
 
 import json
 from pathlib import Path
@@ -14,13 +14,13 @@ from ..core.runtime import native
 
 
 def cache_of(source):
-    """The path of the cache that the object plays; None where it plays none."""
+    """The path of the cache that the object plays; None if it plays none."""
     modifier = modifier_stack.find_cache(source)
     return None if modifier is None else Path(bpy.path.abspath(modifier.filepath, library=source.library))
 
 
 def record_of(source):
-    """What is noted of the object's bake; {} where nothing is, or nothing legible."""
+    """The record of the object's bake, parsed from JSON; {} if it is missing or invalid."""
     try:
         record = json.loads(settings_of(source).bake.record or "{}")
     except ValueError:
@@ -29,9 +29,9 @@ def record_of(source):
 
 
 def problem(source, look_closely=False):
-    """Why the object's bake cannot be played, or is of another mesh, as a UserError; None where all is well.
+    """UserError that says why the object's bake cannot be played or is of another mesh; else None.
 
-    Closely looked at, the mesh itself is read, too, and the cache's header.
+    `look_closely`: also reads the mesh and the cache's header.
     """
     path, record = cache_of(source), record_of(source)
     if path is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""object.arapfields.bake: what is baked of an object, and what its bake is."""
+"""object.arapfields.bake: an object's bake settings, and the record of its bake."""
 
 import bpy
 
@@ -10,7 +10,7 @@ FOLDER = "//cache"
 
 
 def settings(**extra):
-    """Properties that the object has and that an operator's arguments replace for one call."""
+    """Properties of the object that are also operator arguments, which override them for one call."""
     return {
         "format": choice(BAKE_FORMATS, "Format", "What plays the frames", **extra),
         "kind": choice(BAKE_KINDS, "Bake", "What is baked", **extra),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A template that follows a scanned motion: wrapped onto each frame of its target, each from the last."""
+"""Bakes a template that follows a scanned motion: a wrap per frame, each starting from the last one."""
 
 import functools
 import math
@@ -32,8 +32,8 @@ from .object_bake import ObjectBake
 def scans_in(collection, scene, sources, values):
     """{frame: ObjectReference} of a collection's meshes, in the order of their names.
 
-    The last number in a name is its frame, where at least half of these frames are there; else the scene's
-    first frame is that of the first mesh. `values` may have the first and the last frame, `start` and `end`.
+    The last number in a name is its frame, if at least half of these frames have a mesh; else the meshes are
+    numbered from the scene's first frame. `values` may limit the frames by `start` and `end`.
     """
     native.library()
     from arapfields.cli.wrap_sequence import by_numbers
@@ -53,14 +53,14 @@ def scans_in(collection, scene, sources, values):
 
 
 def frames_of(numbers):
-    """The Frames that reach all of these whole numbers."""
+    """The Frames with the largest step that contain all of these whole numbers."""
     numbers = sorted(numbers)
     step = math.gcd(*(number - numbers[0] for number in numbers)) or 1
     return Frames(float(numbers[0]), float(step), (numbers[-1] - numbers[0]) // step + 1)
 
 
 def put_after_armatures(item):
-    """A scan has its own pose: the modifier that plays it comes after those that would pose it again."""
+    """Moves the cache's modifier after Armature modifiers, as a scan is posed already."""
     stack, cache = list(item.modifiers), modifier_stack.find_cache(item)
     if cache is None:
         return
@@ -78,20 +78,20 @@ def scan_at(frame, scans):
 
 
 def off(report):
-    """How far surface and scan are from each other, as a share of the scan's size."""
+    """The larger of the mean distances between surface and scan, as a share of the scan's size."""
     return max(report.to_target_mean, report.from_target_mean)
 
 
 class WrapSolver(FrameSolver):
-    """A request has a scan's vertices and triangles as targets, landmarks as handles. A shape begins at the
-    one before."""
+    """FrameSolver of wraps: a request's targets are a scan's vertices and triangles, its handles landmarks.
+    Each solve starts from the last shape."""
 
     def __init__(self, sampled_source, carrying, frames):
         self.frames, self.report = frames, None
         super().__init__(sampled_source, carrying)
 
     def _make_solver(self, handles, energy):
-        """A wrap has none before its first frame."""
+        """Does nothing: a wrap has no native solver before its first frame."""
 
     def solve_from_rest(self, request, task=None):
         field, self.report = self.frames.follow(
@@ -105,18 +105,17 @@ class WrapSolver(FrameSolver):
 
 
 class WrapBake(ObjectBake):
-    """`scans`: {frame: ObjectReference}; None where the source's own target changes from frame to frame.
-
-    What is kept lies beside the cache; of shape keys, in the session's folder."""
+    """`scans`: {frame: ObjectReference}; None if the source's own target is animated. Solved frames are
+    stored beside the cache; for shape keys, in Blender's temporary folder."""
 
     def __init__(self, context, source, frames, scans, path=None):
         super().__init__(context, source, "WRAP", frames, path)
         self.scans, self.simulation = scans, None
-        self.reader.carrying.is_shown_posed = True  # caches are put behind the armatures
-        self.reader.moves_by_itself = True  # scans take memory: few are read ahead
+        self.reader.carrying.is_shown_posed = True  # caches play after the armatures
+        self.reader.moves_by_itself = True  # limits read-ahead: scans need much memory
         self.marks = landmarks.Marks(source)
         self.values = effective_values(WRAP, settings_of(source).wrap)
-        self.reports, self.left_out = {}, {}  # by frame; frames by what is wrong with them
+        self.reports, self.left_out = {}, {}  # by frame; {error: its frames}
         self.output = path or Path(bpy.app.tempdir, BARRED.sub("_", source.name))
 
     def request(self, context):
@@ -146,7 +145,7 @@ class WrapBake(ObjectBake):
         self.store.open(self.solver)
 
     def add(self, frame, request, is_baked=True, task=None):
-        """A frame that cannot be followed is named, and has the shape before it, or the first one."""
+        """Solves one frame; one that fails is reported, and gets the last shape, or else the first one."""
         shape = None
         try:
             if isinstance(request, Exception):

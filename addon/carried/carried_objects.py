@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One carried object for one run, and what takes the field off it again."""
+"""A carried object during a session or job, and its release."""
 
 from dataclasses import dataclass
 
@@ -27,7 +27,7 @@ class CarriedObject:
         if isinstance(self.carrier, BonesCarrier):
             self.carrier.take_base(item, entry)
         self.may_be_edited = False
-        self.attached = None  # (points, PointsBefore, rest, PointsBeside, Attachment); the worker's
+        self.attached = None  # (points, PointsBefore, rest, PointsBeside, Attachment); worker only
 
     def moves_by_itself(self, item):
         """Whether its points move without an edit of its data."""
@@ -36,7 +36,7 @@ class CarriedObject:
         return isinstance(self.carrier, KeyCarrier) and item.data.shape_keys is not None
 
     def item_and_entry(self, source):
-        """The object and its entry in the source's list; UserError where either is gone."""
+        """The object and its entry in the source's list; UserError if either was removed."""
         item = self.reference.get()
         entry = find(source, item)
         if entry is None:
@@ -69,7 +69,7 @@ def carrier_class(item, way):
 
 
 def release(source, index):
-    """Takes an object off a source's list; it looks as it did before it was carried."""
+    """Removes an object from a source's list and restores its shape from before it was carried."""
     entry = settings_of(source).carried[index]
     item = entry.item
     if item is not None:
@@ -80,20 +80,20 @@ def release(source, index):
 
 
 def give_back(item, entry):
-    """Takes off an object whatever the field put there, in any of the ways to carry it."""
+    """Removes the field's modifier, keys and transforms from an object, whichever carrier wrote them."""
     for carrier in dict.fromkeys((KINDS.get(item.type, TransformCarrier), TransformCarrier)):
         carrier.release(item, entry)
 
 
 def is_carried_otherwise(item, entry, carrier):
-    """Whether the field still moves an object in another way than this carrier's."""
+    """Whether an object still has the motion of another carrier."""
     if base_kind_of(entry) not in ("NONE", carrier.base_kind):
         return True
     return isinstance(carrier, TransformCarrier) and KINDS.get(item.type, TransformCarrier).is_on(item)
 
 
 def give_back_all(source):
-    """Takes the field off all that a source carries."""
+    """Removes the field's motion from all carried objects of a source."""
     for entry in settings_of(source).carried:
         if entry.item is not None and entry.item.library is None:
             give_back(entry.item, entry)

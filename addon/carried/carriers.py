@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One carried object of each kind: what of it the field moves, and how it takes the motion.
+"""Carriers: how each type of carried object is read, and how it receives the field's motion.
 
 Each has `points`, (n, 3) in its own coordinates at rest. `moved(rest, now, parent, after)` runs on a worker:
-rest, now and parent are (4, 4) matrices to solve space, `after` the points there where the field takes them;
-`write` puts what it returns onto the object, on the main thread.
+rest, now and parent are (4, 4) matrices to solve space, `after` the (n, 3) moved points there; `write` puts
+the result onto the object, on the main thread.
 """
 
 import numpy as np
@@ -15,9 +15,9 @@ from ..field_modifier import motion
 
 
 class Carrier:
-    """What all kinds share. `before` is what the object had when it was bound, to be restored."""
+    """Base class. `before`: snapshot of the object from when it was bound, to be restored."""
 
-    base_kind = "NONE"  # of the entry's `base` while the field moves the object this way
+    base_kind = "NONE"  # the entry's `base_kind` while this carrier moves the object
 
     def __init__(self, context, item):
         self.points = self.read(context, item)
@@ -32,19 +32,19 @@ class Carrier:
         return modifier_stack.find(item) is not None
 
     def basis(self, item, entry, depsgraph):
-        """The object's own motion without the field's, where the field moves it as a whole; else None."""
+        """The object's own transform without the field's, if it is moved as a whole; else None."""
         return None
 
     def moved(self, rest, now, parent, after):
         return np.ascontiguousarray(transform(inverse(now), after), dtype=np.float32)
 
     def present(self, item, entry):
-        """The shape that was written last; None where there is none, or it cannot be told."""
+        """The shape that was written last; None if there is none or it is unknown."""
         return None
 
     def rebased(self, shape, own, parent):
-        """The same shape, as `moved` gives it, where (4, 4) `own` takes the object's coordinates to new ones,
-        and `parent` those of its parent."""
+        """A shape by `moved` in new coordinates: (4, 4) `own` maps the object's to them, `parent` its
+        parent's."""
         return np.ascontiguousarray(transform(own, shape), dtype=np.float32)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All that a source carries, for one run: read, moved by fields on a worker, shown, and taken back."""
+"""All carried objects of a source during a session or job: read, moved on a worker, shown, restored."""
 
 from dataclasses import replace
 
@@ -19,16 +19,16 @@ from .rest_bones import above_field
 from .transforms import BonesCarrier
 from .world_matrices import world_matrices
 
-SAME_PLACE = 1e-6  # of an object's size: matrices in single precision
+SAME_PLACE = 1e-6  # tolerance as a share of an object's size, as matrices are in single precision
 
 
 class Carrying:
-    """What a source carries. `warnings`: what is left out and why, each told once."""
+    """A source's carried objects. `warnings`: why objects are left out, each reported once."""
 
     def __init__(self, context, source):
         self.source, self.warnings, self.objects, self.before = ObjectReference(source), [], [], {}
         self.rigs, self.under = modifier_stack.handle_rigs(source), above_field(source)
-        self.is_shown_posed = False  # whether what is written lies behind the armatures of `under`
+        self.is_shown_posed = False  # whether shapes are shown after the armatures of `under`
         self.nodes = helper.Follower(source) if helper.of(source) else None
         for entry in settings_of(source).carried:
             try:
@@ -38,7 +38,7 @@ class Carrying:
                 self.warnings.append(error)
 
     def solids(self, context, space):
-        """[(vertices, triangles)] in solve space of what is sampled together with the body."""
+        """[(vertices, triangles)] in solve space of the meshes that are sampled together with the source."""
         meshes, depsgraph = [], depsgraph_of(context)
         for carried in self.objects:
             if carried.way != "TOGETHER" or not isinstance(carried.carrier, MeshCarrier):
@@ -53,10 +53,10 @@ class Carrying:
             meshes.append((transform(rest, mesh.vertices), facing(mesh.triangles, rest)))
         return meshes
 
-    # Main thread, each time something may have moved.
+    # Main thread, for each request.
 
     def poses(self, space, depsgraph):
-        """[CarriedPose] of all objects; those that are gone are left out, and named."""
+        """[CarriedPose] of all objects; removed ones are left out with a warning."""
         source, poses = self.source.get(), []
         for carried in list(self.objects):
             try:
@@ -77,7 +77,7 @@ class Carrying:
         return poses
 
     def watch(self, objects, data):
-        """Notes whose points may be others: `objects` and `data` are session_uids that Blender updated."""
+        """Marks objects that may be edited: `objects` and `data` are session_uids of updated data-blocks."""
         for carried in self.objects:
             item = carried.reference.find()
             if item is None or item.session_uid in motion.written:
@@ -87,13 +87,13 @@ class Carrying:
             carried.may_be_edited |= edited or moved
 
     def expect_motion(self):
-        """Another frame: what moves by itself may have other points."""
+        """Called at another frame: marks the objects that modifiers or shape keys may have moved."""
         for carried in self.objects:
             item = carried.reference.find()
             carried.may_be_edited |= item is not None and carried.moves_by_itself(item)
 
     def refresh(self, context):
-        """Reads again what may have been edited; whether any has other points."""
+        """Reads marked objects again; returns whether the points of any have changed."""
         changed = False
         for carried in list(self.objects):
             if not carried.may_be_edited or isinstance(carried.carrier, BonesCarrier):
@@ -115,9 +115,9 @@ class Carrying:
     # On a worker.
 
     def moved(self, af, samples, field, poses, strength=1.0, before=None):
-        """[(carried object, what its carrier writes)] where the field takes them, so much of the way.
+        """[(CarriedObject, shape for its carrier)] moved by the field, scaled by `strength`.
 
-        `before`: PointsBefore of the body (surface/points_before.py), where those may have moved.
+        `before`: PointsBefore of the source (surface/points_before.py), if its points may have moved.
         """
         before = None if before is None or before.is_at_rest else before
         moved = [(pose.carried, self.moved_one(af, samples, field, pose, strength, before)) for pose in poses]
@@ -145,17 +145,17 @@ class Carrying:
         return carried.carrier.moved(pose.rest, pose.now, pose.parent, after)
 
     def rows_of_nodes(self, field, local_to_solve, strength):
-        """None for a field that nodes cannot evaluate: they stay as they are."""
+        """The field as rows for the nodes; None, with a warning, if nodes cannot evaluate it."""
         try:
             return helper.rows_of(field, local_to_solve, strength)
         except UserError as error:
             self.warnings.append(error)
             return None
 
-    # Main thread: showing and taking back.
+    # Main thread: show and restore.
 
     def bind(self, context, before=None):
-        """Makes all ready to be moved; `before` is what they had before a run that goes on with this one."""
+        """Prepares all objects for motion; `before`: snapshots of the session that this one replaces."""
         source, before = self.source.get(), dict(before or {})
         for carried in list(self.objects):
             try:
@@ -174,7 +174,7 @@ class Carrying:
             self.before[uid] = before.get(uid) or (self.nodes, self.nodes.read())
 
     def show(self, shapes):
-        """Puts what `moved` made onto the objects; one that cannot take it is named and left out."""
+        """Writes shapes by `moved` to the objects; one that fails is left out with a warning."""
         source = self.source.get()
         for carried, shape in shapes:
             if carried is self.nodes:
@@ -189,12 +189,12 @@ class Carrying:
                 self.leave(carried, error)
 
     def put(self, context, shapes):
-        """Leaves the objects where a field takes them."""
+        """Binds the objects and writes their shapes."""
         self.bind(context)
         self.show(shapes)
 
     def renew(self):
-        """What they have now is what they had before: an undone step put it there."""
+        """Replaces the snapshots `before` by the present shapes, e.g. after undo."""
         source = self.source.get()
         for carried in self.objects:
             if carried.reference.find() is not None and carried.reference.uid in self.before:
@@ -204,7 +204,7 @@ class Carrying:
             self.before[self.nodes.uid] = self.nodes, self.nodes.read()
 
     def take_away(self):
-        """Gives all what they had before."""
+        """Restores the snapshots of all objects."""
         source = self.source.find()
         for carried, before in self.before.values():
             if isinstance(carried, helper.Follower):
@@ -217,7 +217,7 @@ class Carrying:
         self.before.clear()
 
     def forget(self, settings):
-        """Those that a list no longer has were given back already."""
+        """Drops the snapshots of objects that are no longer in the list: these were restored already."""
         listed = {entry.item.session_uid for entry in settings.carried if entry.item is not None}
         if self.nodes is not None:
             listed.add(self.nodes.uid)
@@ -233,7 +233,7 @@ class Carrying:
 
 
 class Reshaped(Exception):
-    """A carried object has another number of points: all is set up again."""
+    """Raised when a carried object's number of points has changed: the solver must be set up again."""
 
 
 PAUSING = ("EDIT", "SCULPT", "SCULPT_CURVES", "EDIT_GREASE_PENCIL")  # modes in which the user changes points

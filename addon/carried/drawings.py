@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the points of hair curves, point clouds and Grease Pencil lie."""
+"""Attribute collections with the points of hair curves, point clouds and Grease Pencil."""
 
 
 def layers_of(item):
-    """The collections of attributes on which an object's points lie; Grease Pencil has one a drawing."""
+    """The attribute collections that hold an object's points; Grease Pencil has one per drawing."""
     if item.type != "GREASEPENCIL":
         return [item.data.attributes]
     drawings = [frame.drawing for layer in item.data.layers for frame in layer.frames]

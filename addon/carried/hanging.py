@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Carried objects that hang on bones which a wrap fits: they stay where the field took them."""
+"""Keeps carried objects in place while a wrap fits the bones that they are parented to."""
 
 import contextlib
 
@@ -14,8 +14,8 @@ from .world_matrices import hangs_on, world_matrices
 
 
 def follow(context, source, shapes, fit):
-    """Calls `fit`, which moves bones of the source at rest; what `shapes` has, [(carried object, what its
-    carrier wrote)], stays where it is."""
+    """Calls `fit`, which moves rest bones of the source's armatures, and keeps the objects of `shapes`,
+    [(CarriedObject, shape that its carrier wrote)], in place."""
     under = above_field(source)
     found = [(carried, shape, carried.reference.find()) for carried, shape in shapes]
     found = [one for one in found if one[2] is not None and hangs_on(one[2], under)]
@@ -29,12 +29,12 @@ def follow(context, source, shapes, fit):
     context.view_layer.update()
     for (carried, shape, item), was, now in zip(found, before, places(), strict=True):
         own, parent = inverse(now.now) @ was.now, inverse(now.parent) @ was.parent
-        with contextlib.suppress(UserError):  # which was told when it was put there first
+        with contextlib.suppress(UserError):  # reported when it was written first
             carried.carrier.write(item, find(source, item), carried.carrier.rebased(shape, own, parent))
 
 
 def present(context, source):
-    """[(carried object, its shape)] as `follow` takes them, of what the field has moved; nobody is named."""
+    """[(CarriedObject, its present shape)] for `follow`, without warnings."""
     found = []
     for entry in settings_of(source).carried:
         with contextlib.suppress(UserError, ValueError):

@@ -54,7 +54,7 @@ class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
 
 
 def carry(source, item, way):
-    """Puts an object on a source's list, or gives it another way there; UserError where that cannot be."""
+    """Adds an object to a source's list, or changes its way; UserError if it cannot be carried."""
     refuse(refusals.of_item(source, item))
     other = settings_of(item).carried_by
     if other is not None and other != source and carried_objects.find(other, item) is not None:

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What plays a bake of hair, point clouds and Grease Pencil, for which Blender has no cache of its own.
+"""Playback of baked hair, point clouds and Grease Pencil, for which Blender has no cache modifier.
 
-A mesh without faces has the points, in no scene; it plays the frames, by Mesh Cache or by shape keys, and a
-modifier of the object takes each point's position from there. All of it is Blender's own: it plays and
-renders without the extension. An attribute of the points tells their vertex there, counted from 1; points
-that are drawn later have none, and stay.
+A mesh without faces, in no scene, holds the points; it plays the frames by a Mesh Cache modifier or by shape
+keys, and a nodes modifier on the object reads each point's position from it. It plays and renders without the
+extension. A point attribute holds the vertex index plus 1; points that are drawn later have none, and stay.
 """
 
 import bpy
@@ -54,8 +53,8 @@ def find(item):
 
 
 def play(item, points, counts):
-    """Has the object play a new mesh of these (n, 3) points, `counts` in each of its drawings; returns that
-    mesh's object, which still rests. A bake before goes."""
+    """Makes the object play a new mesh of these (n, 3) points, `counts` per drawing; returns the mesh's
+    object, without frames yet. Removes an earlier bake."""
     layers = layers_of(item)
     if counts != [len(layer["position"].data) for layer in layers]:
         raise UserError("{name} changed while it was worked on; run again", item)
@@ -81,14 +80,14 @@ def play(item, points, counts):
 
 
 def set_playing(item, on):
-    """Shows the bake instead of the field, or the other way round."""
+    """Shows the bake's modifier and hides the field's, or the reverse."""
     for modifier, shown in ((find(item), on), (modifier_stack.find(item), not on)):
         if modifier is not None:
             modifier.show_viewport = modifier.show_render = shown
 
 
 def remove(item):
-    """Takes the bake off; the cache's file stays."""
+    """Removes the bake from the object; the cache file stays."""
     modifier = find(item)
     if modifier is None:
         return

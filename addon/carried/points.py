@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects that are carried point by point and are no meshes: by the field's modifier, or by a shape key."""
+"""Carriers of pointwise objects that are no meshes: by the field's modifier, or by a shape key."""
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from . import played_points
 from .carriers import Carrier
 from .drawings import layers_of
 
-BAKED_KEY = "ARAP Fields frame "  # how baked keys of curves and lattices begin
-SURFACE_NODE = "GeometryNodeDeformCurvesOnSurface"  # of modifiers that move hair with its surface
+BAKED_KEY = "ARAP Fields frame "  # prefix of baked keys of curves and lattices
+SURFACE_NODE = "GeometryNodeDeformCurvesOnSurface"  # node that moves hair with its surface
 
 
 def refuse_shared(item):
@@ -25,7 +25,7 @@ def refuse_shared(item):
 
 
 class AttributeCarrier(Carrier):
-    """Hair curves, point clouds, Grease Pencil: an offset a point on the data itself, and a modifier."""
+    """Hair curves, point clouds, Grease Pencil: a point attribute with offsets, and a modifier."""
 
     def read(self, context, item):
         refuse_shared(item)
@@ -92,7 +92,7 @@ def put_offsets(item, counts, offsets):
 
 
 class KeyCarrier(Carrier):
-    """Curves, surfaces and lattices: a shape key of its own, above the user's."""
+    """Curves, surfaces and lattices: an own shape key on top of the user's."""
 
     def read(self, context, item):
         refuse_shared(item)
@@ -147,7 +147,7 @@ def own_key(item):
 
 
 def drop_key(item, also_basis):
-    """Takes our key away; the basis too, where nothing else is left and there need not be one."""
+    """Removes the field's shape key; with `also_basis`, also a Basis that is left alone."""
     if own_key(item) is not None:
         item.shape_key_remove(own_key(item))
     keys = item.data.shape_keys
@@ -168,7 +168,7 @@ FIELDS = ("co", "handle_left", "handle_right")  # of a Bézier point
 
 
 def parts_of(item):
-    """[(positions a point, points)] of an object's splines; of a lattice, one."""
+    """[(positions per point, number of points)] of an object's splines; one entry for a lattice."""
     if item.type == "LATTICE":
         return [(1, len(item.data.points))]
     splines = item.data.splines
@@ -176,7 +176,7 @@ def parts_of(item):
 
 
 def own_points(item):
-    """(n, 3) an object's control points, with its shape keys but without ours."""
+    """(n, 3) an object's control points with its shape keys, except the field's."""
     keys = item.data.shape_keys
     if keys is not None:
         points = key_points(keys.reference_key)
@@ -196,7 +196,7 @@ def own_points(item):
 
 
 def key_points(key):
-    """(n, 3) positions of a key, those of Bézier points with their handles."""
+    """(n, 3) positions of a shape key, including the handles of Bézier points."""
     points = []
     for point in key.data:
         points += [getattr(point, field) for field in FIELDS if hasattr(point, field)]

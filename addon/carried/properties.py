@@ -14,7 +14,7 @@ BASE_KINDS = (
 
 
 class ARAPFIELDS_PG_carried(bpy.types.PropertyGroup):
-    # `name`, which every entry has, is the object's when it was added: it tells what was deleted
+    # `name`, which every PropertyGroup has, keeps the object's name for messages after its deletion
     item: pointer(bpy.types.Object, "Object", "Moved by the field of the object that carries it")
     way: choice(CARRYING, "Way", "How the object is carried")
     base: text("Own Pose", "The object's own delta transforms or pose while the field moves it, as JSON")

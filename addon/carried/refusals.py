@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Why an object is not carried."""
+"""UserErrors that say why an object is not carried."""
 
 from ..blender.modifier_stack import handle_rigs
 from ..blender.object_references import in_scene, settings_of
@@ -13,7 +13,7 @@ BINDING |= {"MESH_DEFORM": "object", "SURFACE_DEFORM": "target"}
 
 
 def of_entry(source, entry):
-    """Why an entry of a source's list is left out now, as a UserError; None where it is not."""
+    """UserError that says why an entry of a source's list is left out now; else None."""
     item = entry.item
     if not in_scene(item):
         return UserError("{name}, which {source} carries, was deleted", entry, source=source.name)
@@ -28,7 +28,7 @@ def of_entry(source, entry):
 
 
 def of_item(source, item):
-    """Why an object cannot be carried at all, as a UserError; None where it can."""
+    """UserError that says why an object cannot be carried at all; else None."""
     if item == source:
         return UserError("{name} cannot carry itself", item)
     if item.library is not None:
@@ -49,7 +49,7 @@ def of_item(source, item):
 
 
 def of_splats(item):
-    """Why splats do not move by the field of another object, as a UserError; None for other geometry."""
+    """UserError if an object holds splats, which another object's field cannot move; else None."""
     return (
         UserError("{name} holds splats; only handles of its own turn them", item)
         if holds_splats(item)
@@ -58,7 +58,7 @@ def of_splats(item):
 
 
 def moves_anyway(source, item):
-    """Names what an object moves with already, which the field moves; None where there is nothing."""
+    """UserError if an object already follows another one that the field moves; else None."""
     carried = [entry.item for entry in settings_of(source).carried if entry.item not in (None, item)]
     parent = item.parent
     while parent is not None:

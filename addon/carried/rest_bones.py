@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Armatures whose bones go along with a wrap: their rest is moved by its field, and can be given back."""
+"""Fits the rest bones of a source's armatures to a wrap by its field; the old rest pose can be restored."""
 
 import json
 from contextlib import contextmanager
@@ -16,7 +16,7 @@ from ..core.geometry.spaces import inverse, transform
 from ..handles.movers import matrix_of, numbered
 from ..names import BONE_NUMBER
 
-LEAST_BONE = 1e-5  # of the object's size; Blender removes bones without a length
+LEAST_BONE = 1e-5  # of the object's size; Blender deletes zero-length bones
 
 
 def armatures_of(source):
@@ -27,12 +27,12 @@ def armatures_of(source):
 
 
 def above_field(source):
-    """The armatures that pose what a source's field has moved."""
+    """The armatures whose modifiers come after a source's field."""
     return armatures_of(source) if settings_of(source).under_rig else []
 
 
 def posed_with(source):
-    """The source, and the meshes that it carries which its armatures pose too."""
+    """The source, and its carried meshes that the same armatures pose."""
     worn = [entry.item for entry in settings_of(source).carried]
     worn = [item for item in worn if in_scene(item) and item.type == "MESH" and item.library is None]
     rigs = {*armatures_of(source)}
@@ -40,7 +40,7 @@ def posed_with(source):
 
 
 def refusal(rig):
-    """Why an armature's bones cannot be fitted, as a UserError; None where they can."""
+    """UserError that says why an armature's bones cannot be fitted; else None."""
     if rig.library is not None or rig.data.library is not None or rig.override_library is not None:
         return UserError("The bones of {rig} stay: it is linked from another file", rig=rig.name)
     if rig.mode == "EDIT":
@@ -51,7 +51,7 @@ def refusal(rig):
 
 
 class Fitting:
-    """The bones of a source's armatures, for one wrap. `warnings`: which of them stay, and why."""
+    """Fits the bones of a source's armatures to one wrap. `warnings`: which of them stay, and why."""
 
     def __init__(self, source, space):
         self.warnings, self.rigs, self.moved = [], [], []
@@ -63,7 +63,7 @@ class Fitting:
                 self.rigs.append((ObjectReference(rig), *resting(rig), space.world_to_solve @ matrix_of(rig)))
 
     def move(self, field):
-        """Finds where the bones belong, on a worker."""
+        """Computes the new rest pose of the bones; on a worker."""
         self.moved = []
         for reference, names, poses, lengths, to_solve in self.rigs:
             points = posing.bone_points(poses, lengths)
@@ -78,7 +78,7 @@ class Fitting:
             self.moved.append((reference, names, transform(back, heads), transform(back, tails), axes))
 
     def put(self, context):
-        """Moves the bones at rest, on the main thread."""
+        """Writes the new rest pose to the armatures; on the main thread."""
         for reference, names, heads, tails, axes in self.moved:
             rig = reference.get()
             if not settings_of(rig).rest_bones:
@@ -96,7 +96,7 @@ def rest_of(rig):
 
 
 def noted(rig):
-    """The same of the bones before they were fitted, by the names that they have now."""
+    """The same for the stored rest pose from before any fit, by the bones' present names."""
     names = {getattr(bone, BONE_NUMBER): bone.name for bone in reversed(rig.data.bones)}
     known = json.loads(settings_of(rig).rest_bones or "{}")
     numbers = {name: ends[3] if ends[3:] else 0 for name, ends in known.items()}
@@ -119,7 +119,7 @@ def resting(rig):
 
 
 def write(context, rig, ends):
-    """Puts bones at rest where {name: (head, tail, z axis)} say; those that are gone are passed over."""
+    """Writes {name: (head, tail, z axis)} to the rest bones; skips names without a bone."""
     least = LEAST_BONE * max(np.ptp([end for head, tail, _ in ends.values() for end in (head, tail)], axis=0))
     with edit_bones(context, rig) as bones:
         for name, (head, tail, _) in ends.items():
@@ -131,12 +131,12 @@ def write(context, rig, ends):
 
 
 def fitted(source):
-    """The armatures of a source whose bones at rest are not where they were."""
+    """The armatures of a source whose rest bones were fitted."""
     return [rig for rig in armatures_of(source) if settings_of(rig).rest_bones]
 
 
 def reset(context, source):
-    """Gives the bones of a source's armatures the rest that they had before they were fitted."""
+    """Restores the rest pose from before any fit in a source's armatures."""
     for rig in fitted(source):
         refuse(refusal(rig))
         write(context, rig, noted(rig))
@@ -144,7 +144,7 @@ def reset(context, source):
 
 
 class BeforeArmatures:
-    """The field's place before a source's armatures, taken for one wrap and given back where that fails."""
+    """Moves the field's modifier before a source's armatures for one wrap; moves it back if that fails."""
 
     def __init__(self, source):
         stack, first = list(source.modifiers), modifier_stack.first_posing(source)
@@ -174,7 +174,7 @@ class BeforeArmatures:
 
 @contextmanager
 def edit_bones(context, rig):
-    """The armature's bones at rest, to be changed; what was active, selected and hidden is so afterwards."""
+    """Context manager: the armature's edit bones; restores the active object, selection and visibility."""
     layer = context.view_layer
     active = layer.objects.active
     mode = active.mode if active is not None else "OBJECT"

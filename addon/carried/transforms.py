@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects that are carried as a whole, and armatures bone by bone."""
+"""Carriers of whole objects, by delta transforms, and of armatures, by pose bones."""
 
 import json
 
@@ -16,9 +16,8 @@ from .world_matrices import array
 
 
 class PoseCarrier(Carrier):
-    """What takes the motion in channels of the object; the user's own values are the entry's `base`, as JSON.
-
-    `state(item)` is {name: numbers} of these channels, `put_state` writes them.
+    """Base of carriers that write to an object's channels; the user's own values are stored in the entry's
+    `base`, as JSON. `state(item)` is {name: numbers} of these channels, `put_state` writes them.
     """
 
     def bind(self, context, item, entry):
@@ -34,7 +33,7 @@ class PoseCarrier(Carrier):
 
     @classmethod
     def own_state(cls, item, entry):
-        """The state that is the user's own."""
+        """The user's own state, without the field's motion."""
         return cls.state(item) | (json.loads(entry.base) if base_kind_of(entry) == cls.base_kind else {})
 
     @classmethod
@@ -45,7 +44,7 @@ class PoseCarrier(Carrier):
 
 
 def base_kind_of(entry):
-    """What the entry's `base` holds; files of versions that had no such field tell it by the base's names."""
+    """The kind of the entry's `base`; files from versions without `base_kind` tell it by the base's keys."""
     if not entry.base or entry.base_kind != "NONE":
         return entry.base_kind
     return "TRANSFORM" if set(DELTAS) == set(json.loads(entry.base)) else "BONES"
@@ -68,7 +67,7 @@ class TransformCarrier(PoseCarrier):
         return own_basis(item.evaluated_get(depsgraph), self.own_state(item, entry))
 
     def moved(self, rest, now, parent, after):
-        """The (4, 4) own motion that takes the object, as a whole, to where its points go."""
+        """(4, 4) own transform of the object, by the rigid motion that fits its moved points."""
         whole = posing.rigid_motion_of(transform(rest, self.points), after)
         return inverse(parent) @ whole @ rest
 
@@ -105,16 +104,16 @@ class TransformCarrier(PoseCarrier):
 
 
 DELTAS = ("delta_location", "delta_rotation_euler", "delta_rotation_quaternion")
-BAKED_GROUP = "ARAP Fields"  # of the curves of deltas that a bake keyed
+BAKED_GROUP = "ARAP Fields"  # F-curve group of delta transforms that a bake keyed
 
 
 def forget_baked(item):
-    """Removes the keys of deltas that a bake made; the user's own stay."""
+    """Removes a bake's F-curves of delta transforms; the user's own stay."""
     remove_curves(item, lambda one: one.group is not None and one.group.name == BAKED_GROUP)
 
 
 def own_basis(item, base):
-    """(4, 4) the motion of an object's channels with these deltas."""
+    """(4, 4) local transform of an object with the delta transforms of `base`."""
     quaternion = item.rotation_mode == "QUATERNION"
     rotation = item.rotation_quaternion if quaternion else item.rotation_euler.to_quaternion()
     location = item.location + Vector(base["delta_location"])
@@ -129,7 +128,7 @@ def base_turn(item, base):
 
 
 class BonesCarrier(PoseCarrier):
-    """An armature: each bone's pose follows, heads where they go, bones towards their moved tails."""
+    """An armature: each pose bone is moved with its head and points to its moved tail."""
 
     base_kind = "BONES"
 
@@ -146,7 +145,7 @@ class BonesCarrier(PoseCarrier):
         return posing.bone_points(self.rest, self.lengths)
 
     def take_base(self, item, entry):
-        """The points are those of the pose that is the user's own."""
+        """Sets `points` from the user's own pose."""
         bases = self.own_state(item, entry)
         bases = np.array([bases[name] for name in self.names], dtype=np.float64)
         self.poses = posing.posed(self.rest, self.parents, bases)

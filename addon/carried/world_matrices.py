@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a carried object is, and where it would be while the bones that are handles rest.
+"""World matrices of a carried object: now, and with the bones that are handles at rest.
 
-An object that hangs on such a bone goes with it already; the field moves it from where the bone rests, so
-that no motion counts twice.
+An object parented to such a bone follows it already: the field moves it from the bone's rest pose, so that no
+motion counts twice.
 """
 
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from mathutils import Matrix
 from ..core.errors import UserError
 from .rest_bones import resting
 
-FOLLOWING = {"CHILD_OF", "COPY_LOCATION", "COPY_TRANSFORMS", "ARMATURE"}  # constraints that place an object
+FOLLOWING = {"CHILD_OF", "COPY_LOCATION", "COPY_TRANSFORMS", "ARMATURE"}  # that place an object
 
 
 @dataclass(frozen=True)
 class WorldMatrices:
-    """(4, 4) matrices to the world: of the object at rest and now, and of its parent now."""
+    """(4, 4) world matrices: of the object at rest and now, and of its parent now."""
 
     rest: np.ndarray
     now: np.ndarray
@@ -30,10 +30,10 @@ def array(matrix):
 
 
 def world_matrices(item, rigs, depsgraph, basis=None, under=()):
-    """The object's matrices; `basis` is its own motion where that is not the object's present one.
+    """The object's WorldMatrices; `basis`: its own transform, if other than the present one.
 
-    `under`: armatures that pose what the field has moved. What hangs on one of their bones is taken without
-    the pose: at rest where the bones were before they were fitted, now where they rest since.
+    `under`: armatures that come after the field. An object parented to one of their bones is taken without
+    the pose: `rest` by the rest bones before any fit, `now` by the present rest bones.
     """
     seen = item.evaluated_get(depsgraph)
     now, own = array(seen.matrix_world), array(seen.matrix_basis)
@@ -49,7 +49,7 @@ def world_matrices(item, rigs, depsgraph, basis=None, under=()):
 
 
 def parent_now(item, depsgraph, now, own):
-    """What takes the object's own motion to the world."""
+    """(4, 4) matrix from the object's own transform to the world."""
     if item.parent is None:
         return np.eye(4)
     is_flat = np.linalg.det(own[:3, :3]) == 0.0
@@ -64,7 +64,7 @@ def parent_at_rest(item, rigs, depsgraph):
 
 
 def parent_of(item, depsgraph, world, posed):
-    """The parent's part in an object's matrix where the parent is at `world`."""
+    """(4, 4) the parent's part of an object's world matrix, for a parent at `world`."""
     inverse = array(item.matrix_parent_inverse)
     if item.parent_type == "OBJECT":
         return world @ inverse
@@ -79,8 +79,7 @@ def parent_of(item, depsgraph, world, posed):
 
 
 def unposed_parent(item, rigs, depsgraph, rest_of):
-    """The same where the bones of these armatures have no pose; `rest_of(rig, name)`: a bone's (4, 4) matrix
-    and length."""
+    """The same with these armatures unposed; `rest_of(rig, name)`: a bone's (4, 4) rest matrix and length."""
     parent, inverse = item.parent, array(item.matrix_parent_inverse)
     if not (parent in rigs and item.parent_type == "BONE"):
         own = array(parent.evaluated_get(depsgraph).matrix_basis)
@@ -96,12 +95,12 @@ def unposed_parent(item, rigs, depsgraph, rest_of):
 
 
 def at_present_rest(item, depsgraph):
-    """What takes the own motion of an object on a bone to the world while the armature has no pose."""
+    """(4, 4) matrix from the own transform of an object parented to a bone to the world, without the pose."""
     return unposed_parent(item, (item.parent,), depsgraph, present_rest)
 
 
 def first_rest(rig, name):
-    """A bone's rest before any fit."""
+    """(4, 4) rest matrix and length of a bone before any fit."""
     bones, poses, lengths = resting(rig)
     index = bones.index(name)
     return poses[index], lengths[index]
@@ -117,14 +116,14 @@ def names(item):
 
 
 def hangs_on(item, rigs):
-    """Whether an object goes with a bone of one of these armatures, by itself or by what it is a child of."""
+    """Whether an object or one of its ancestors is parented to a bone of one of these armatures."""
     if item.parent is None:
         return False
     return (item.parent in rigs and item.parent_type == "BONE") or hangs_on(item.parent, rigs)
 
 
 def constrained_to(item, rigs):
-    """Whether constraints place the object by one of these armatures, which cannot be told from the field."""
+    """Whether constraints move the object by one of these armatures: inseparable from the field's motion."""
     return any(c.enabled and c.type in FOLLOWING and targets(c) & set(rigs) for c in item.constraints)
 
 

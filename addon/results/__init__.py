@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was made of a source, and where it goes."""
+"""Results of solves, and their placement in the scene."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a solve made goes where the user wants it: a modifier, a new object, the mesh itself, a shape key."""
+"""Places a solve's result: in the modifier, a new object, the mesh itself, or a shape key."""
 
 import json
 from dataclasses import dataclass, field
@@ -23,19 +23,19 @@ from . import result_objects
 
 @dataclass
 class SolvedMesh:
-    """What the worker hands back, in local coordinates."""
+    """Result of a solve on the worker, in local coordinates."""
 
     vertices: np.ndarray
     topology: Topology | None  # of the implicit surface; None for the source's own mesh
     report: dict
-    turns: np.ndarray | None = None  # (n, 3) axis · angle, for free custom normals
-    changes: dict | None = None  # of splats' attributes
-    carried: list = field(default_factory=list)  # what Carrying.moved made
-    place: np.ndarray | None = None  # (4, 4) local → world: where the object itself goes, if it does
+    turns: np.ndarray | None = None  # (n, 3) rotation vectors (axis · angle), for free custom normals
+    changes: dict | None = None  # the splats' changed attributes
+    carried: list = field(default_factory=list)  # [(CarriedObject, shape)] by Carrying.moved
+    place: np.ndarray | None = None  # (4, 4) new world matrix of the object, if it is moved
 
 
 def destination(settings, operator):
-    """(output, result) of a call: what is made, where it goes; `target` is the earlier name of the latter."""
+    """(output, result) of an operator call; `target` is the earlier name of `result`."""
     given = operator.properties.is_property_set
     name = "target" if given("target") and not given("result") else "result"
     output = effective_value("output", settings, operator)
@@ -43,34 +43,34 @@ def destination(settings, operator):
 
 
 def placement_refusal(source):
-    """Why a result cannot go where the object's settings say, as a UserError; None where it can."""
+    """UserError that says why the result of the object's settings cannot be placed; else None."""
     settings = settings_of(source)
     return refusal(source, settings.output, effective_result(settings.output, settings.result))
 
 
 def replaced_by(source, kind):
-    """The UserError that says which result a run of that kind replaces; None where nothing is lost."""
+    """UserError that says which result a run of that kind replaces; else None."""
     is_lost = not settings_of(source).live_kind and settings_of(source).result != "NEW"
     return layers.replaced(source, kind) if is_lost else None
 
 
 def effective_result(output, result):
-    """Where a result goes: surfaces, which no modifier can make of the mesh, go to a new object."""
+    """`result`, but NEW for implicit surfaces, which the modifier cannot make of the mesh."""
     return "NEW" if result == "MODIFIER" and output != "WARP" else result
 
 
 def keeps_mesh(output, result):
-    """Whether the source's own vertices take the result as a modifier."""
+    """Whether the result is the source's modifier, which leaves its mesh as it is."""
     return output == "WARP" and result == "MODIFIER"
 
 
 def in_place(output, result):
-    """Whether the shape that is worked on is that at the modifier's place, rather than all that is shown."""
+    """Whether a solve reads the mesh at the modifier's place in the stack, not after all modifiers."""
     return output == "WARP" and result != "NEW"
 
 
 def place_result(context, source, kind, output, result, moved, before):
-    """Puts `moved`, a SolvedMesh, where `result` says; `before` are the vertices at rest."""
+    """Places `moved`, a SolvedMesh, by `result`; `before`: (n, 3) vertices at rest."""
     if result == "NEW":
         return new_object(context, source, kind, output, moved, before)
     refuse(refusal(source, output, result))
@@ -96,7 +96,7 @@ def place_result(context, source, kind, output, result, moved, before):
         single_user(source)
         mesh_arrays.set_positions(source.data, moved.vertices)
     armatures.silence(source)
-    motion.discard(source)  # what it moved is part of the mesh now
+    motion.discard(source)  # the mesh contains its motion now
     if source.data.shape_keys is None:
         layers.discard(source)
     layers.uncover(source)
@@ -108,8 +108,8 @@ def place_result(context, source, kind, output, result, moved, before):
 
 
 def holds_place(source, target):
-    """Whether its place in the world is not its own to change: something else sets it or refers to it, or
-    the target of its wrap goes along."""
+    """Whether the source's transform must stay: because animation, constraints, handles, armatures or a
+    sheared parent depend on it, or the target of its wrap is its child."""
     settings, data = settings_of(source), source.animation_data
     bound = source.constraints or settings.carried or empties.used(source)
     posed = any(modifier.type == "ARMATURE" for modifier in source.modifiers)
@@ -122,14 +122,14 @@ def holds_place(source, target):
 
 
 def hangs_on(item, other):
-    """Whether an object is a child of another, or a child's child."""
+    """Whether an object is a descendant of another."""
     while item is not None and item.parent != other:
         item = item.parent
     return item is not None
 
 
 def put(context, item, place):
-    """Puts an object where a matrix, (4, 4) local → world, says, wherever it was moved meanwhile."""
+    """Sets an object's world matrix to (4, 4) `place`, even if the object was moved meanwhile."""
     item.matrix_world = Matrix(place.tolist())
     context.view_layer.update()
 
@@ -146,7 +146,7 @@ def new_object(context, source, kind, output, moved, before):
 
 
 def refusal(source, output, result):
-    """Why the source itself cannot take the result, as a UserError; None where it can."""
+    """UserError that says why the source itself cannot take the result; else None."""
     if not keeps_mesh(output, result) and holds_splats(source):
         return UserError(
             "{name} holds splats; choose Original Mesh as geometry, Modifier for the result", source
@@ -169,7 +169,7 @@ def refusal(source, output, result):
 
 
 def refusal_of_stack(source):
-    """Why the mesh itself cannot take moved vertices, as a UserError; None where it can."""
+    """UserError that says why the mesh itself cannot take moved vertices; else None."""
     if result_objects.keeps_vertices(source, in_place=True):
         return None
     names = [modifier.name for modifier in modifier_stack.shown_before(source, in_place=True)]
@@ -184,6 +184,6 @@ def refusal_of_stack(source):
 
 
 def single_user(source):
-    """A mesh of its own: other objects that share it stay as they are."""
+    """Makes the source's mesh single-user, so that other objects keep theirs."""
     if source.data.users > 1:
         source.data = source.data.copy()

@@ -27,7 +27,7 @@ def collection(context):
 
 
 def discard(item):
-    """Takes a result away with all that was made for it: mesh, keys' animation, an empty collection."""
+    """Removes a result object with its mesh, its keys' action, and its collection if that is empty."""
     homes = list(item.users_collection)
     remove_mesh_object(item)
     for home in homes:
@@ -36,7 +36,7 @@ def discard(item):
 
 
 def existing(context, source, kind, output):
-    """The result that an earlier run made, where it can be written to."""
+    """The result object of an earlier run, if it can be written to; else None."""
     for entry in settings_of(source).results:
         item = entry.item
         if entry.kind == kind and entry.output == output and item is not None:
@@ -55,7 +55,7 @@ def register(source, kind, output, item):
 
 
 def show(context, source, kind, output, mesh, report, select=True):
-    """Puts the mesh on the source's result object of that kind, exactly where the source is."""
+    """Gives the mesh to the source's result object of that kind, with the source's transform."""
     item = existing(context, source, kind, output)
     mesh.name = f"{source.name}{RESULT_SUFFIX[kind]}"
     if item is None:
@@ -79,7 +79,7 @@ LOOKS = ("color", "pass_index", "is_shadow_catcher", "is_holdout", *(f"visible_{
 
 
 def look_like(source, item):
-    """Gives a new result what of the source's look is the object's own: materials, visibility to rays."""
+    """Copies the source's object-level look to a new result: material slots, ray visibility."""
     for given, slot in zip(source.material_slots, item.material_slots, strict=False):
         if given.link == "OBJECT":
             slot.link, slot.material = "OBJECT", given.material
@@ -92,10 +92,10 @@ CHANNELS += ("scale", "delta_location", "delta_rotation_euler", "delta_rotation_
 
 
 def place(context, source, item):
-    """Puts a result exactly where its source is: under the same parent, with the same channels.
+    """Gives a result its source's transform: the same parent and the same channels.
 
-    A matrix alone would lose the shear of unevenly scaled parents. Only where constraints or the like
-    move the source beyond its channels, the matrix is taken.
+    A world matrix alone would lose the shear of non-uniformly scaled parents. It is used only if
+    constraints or the like move the source beyond its channels.
     """
     item.parent, item.parent_type, item.parent_bone = source.parent, source.parent_type, source.parent_bone
     if source.parent_type in ("VERTEX", "VERTEX_3"):
@@ -130,9 +130,9 @@ def surface_mesh(source, vertices, topology):
 
 
 def warp_mesh(context, source, before, after):
-    """A copy of the source's mesh whose vertices, (n, 3) `before` as shown, lie at `after`.
+    """A copy of the source's mesh with its vertices moved from `before` to `after`, (n, 3) each.
 
-    All else on the mesh is kept. Where modifiers changed the vertices, the copy is of the mesh as shown.
+    All other data are kept. If modifiers change the vertices, the evaluated mesh is copied.
     """
     copied = source.data.copy()
     if keeps_vertices(source) and len(copied.vertices) == len(before):
@@ -153,9 +153,7 @@ def copy_modifiers(item, given):
         made = item.modifiers.new(one.name, one.type)
         for field in one.bl_rna.properties:
             if not field.is_readonly:
-                with contextlib.suppress(
-                    TypeError, ValueError, AttributeError
-                ):  # what its kind does not take
+                with contextlib.suppress(TypeError, ValueError, AttributeError):  # not valid for this type
                     setattr(made, field.identifier, getattr(one, field.identifier))
         if one.type == "NODES":
             for name in one.keys():  # noqa: SIM118
@@ -163,7 +161,7 @@ def copy_modifiers(item, given):
 
 
 def retarget(item, own):
-    """What the modifiers and constraints of a copy point to, its twin takes the place of."""
+    """Replaces pointers of a copy's modifiers and constraints by `own`, {data-block: its twin}."""
     ends = [*item.modifiers, *item.constraints]
     ends += [one for constraint in item.constraints for one in getattr(constraint, "targets", ())]
     for end in ends:
@@ -173,8 +171,8 @@ def retarget(item, own):
 
 
 def shown_mesh(context, source, count, in_place=False):
-    """A mesh of its own of what is shown of the source: modifiers, those before the field's place or all, and
-    shape keys applied."""
+    """A new mesh with the source's shape keys and modifiers applied: all, or with `in_place` those before the
+    field's modifier."""
     applied = modifier_stack.mesh_copy(context, source, in_place)
     if len(applied.vertices) != count:
         bpy.data.meshes.remove(applied)
@@ -183,7 +181,7 @@ def shown_mesh(context, source, count, in_place=False):
 
 
 def add_frame(item, frames, number, shape):
-    """A shape key for one of the frames, at full value there and at none on its neighbours."""
+    """Adds a shape key for a frame, keyframed with 1 at it and 0 at the frames beside it."""
     if number == 0:
         item.shape_key_add(name="Basis", from_mix=False)
     key = item.shape_key_add(name=f"frame {frames[number]}", from_mix=False)
@@ -194,8 +192,8 @@ def add_frame(item, frames, number, shape):
 
 
 def keeps_vertices(source, in_place=False):
-    """Whether the shape to work on has just the vertices of the object's own mesh: no modifier acts, but
-    results below where that is worked on."""
+    """Whether the shape to solve has the vertices of the object's own mesh: no modifier acts on it, except
+    the field's lower layers with `in_place`."""
     keys = source.data.shape_keys
     usable = keys is None or (keys.use_relative and not source.show_only_shape_key)
     before = modifier_stack.shown_before(source, in_place)
@@ -203,7 +201,7 @@ def keeps_vertices(source, in_place=False):
 
 
 def add_warp_key(item, before, after):
-    """On a mesh with shape keys the motion is a key of its own: every other key and slider stays as it is."""
+    """Adds the motion as a shape key to a mesh with keys: all other keys and values stay."""
     keys = item.data.shape_keys
     old = keys.key_blocks.get(WARP_KEY)
     if old is not None:

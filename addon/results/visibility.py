@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Of a source and what was made of it, only the newest is seen in one place: the others are set aside."""
+"""Shows only the newest of a source and its result objects in one place, and hides the others."""
 
 import contextlib
 import json
@@ -11,16 +11,16 @@ from ..blender.object_references import in_scene, settings_of
 
 
 def family(source):
-    """The source, and its results that are in a scene."""
+    """The source, and its result objects that are in a scene."""
     results = [entry.item for entry in settings_of(source).results if in_scene(entry.item)]
     return [source, *(item for item in results if item != source)]
 
 
 def show_alone(source, shown, for_now=False):
-    """Hides what else of the family lies in the place of `shown`, from viewport and renders, and shows that
-    again where it had been set aside itself; `for_now`: until `give_back`. Returns names of what is hidden.
+    """Hides the rest of the family in the same place as `shown` in viewports and renders, and unhides `shown`
+    if it was set aside; `for_now`: until `give_back`. Returns the names of hidden objects.
 
-    Where the user hides `shown`, by its collection maybe, all else stays as it is.
+    If the user hides `shown`, or its collection, nothing else changes.
     """
     if settings_of(shown).set_aside:
         change(shown, False, for_now)
@@ -36,7 +36,7 @@ def show_alone(source, shown, for_now=False):
 
 
 def hidden_note(names):
-    """That these are hidden now, to be put behind the name of a result; empty where none is."""
+    """Text that names hidden objects, to append to a result's name; empty without any."""
     if not names:
         return ""
     one = translated("{name} is hidden", name=names[0])
@@ -62,7 +62,7 @@ def put(item, hidden, hidden_in_renders):
 
 
 def give_back(source):
-    """Shows and hides the family as it was before what was `for_now`."""
+    """Restores the family's visibility from before `for_now`."""
     for item in family(source):
         settings = settings_of(item)
         if settings.live_hidden:
@@ -72,6 +72,6 @@ def give_back(source):
 
 
 def forget(source):
-    """What was `for_now` stays."""
+    """Makes visibility set `for_now` permanent."""
     for item in family(source):
         settings_of(item).live_hidden = ""

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin weights of an armature's bones, and correctives, from poses of the field."""
+"""Skin weights and corrective shape keys of an armature, computed from poses of the field."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which armature and which meshes are skinned, why not, and the armature's bones for the library."""
+"""The armature and the meshes to skin, checks for both, and native bones of the armature."""
 
 from contextlib import contextmanager
 
@@ -8,7 +8,7 @@ import numpy as np
 from ..blender import modifier_stack, object_references
 from ..core.errors import UserError
 
-# Radians to which a joint's limits are cut, and those of an axis without any where others have some.
+# Radians: largest joint limit, and the limit of an axis without one if other axes have some.
 WIDEST, FREE = np.radians(60.0), np.radians(25.0)
 
 
@@ -22,7 +22,7 @@ def rig_of(context):
 
 
 def followed(item):
-    """The armatures that pose a mesh object, by a modifier or as its parent."""
+    """The armatures that deform a mesh object, by a modifier or as its parent."""
     rigs = [m.object for m in item.modifiers if m.type == "ARMATURE" and m.object is not None]
     return rigs + ([item.parent] if is_posed_by_parent(item) else [])
 
@@ -32,7 +32,7 @@ def is_posed_by_parent(item):
 
 
 def meshes_of(context, rig, scope):
-    """The mesh objects to skin; handles' and results' own objects are left out."""
+    """The mesh objects to skin; objects of handles and results are left out."""
     within = context.selected_objects
     if scope == "COLLECTION":
         within = [item for home in rig.users_collection for item in home.all_objects]
@@ -41,7 +41,7 @@ def meshes_of(context, rig, scope):
 
 
 def refusal(rig, meshes):
-    """Why these cannot be skinned, as a UserError; None where they can."""
+    """UserError that says why these meshes cannot be skinned; else None."""
     if rig is None or not meshes:
         return UserError("Select the meshes, then the armature")
     if not rig.data.bones:
@@ -54,7 +54,7 @@ def refusal(rig, meshes):
 
 
 def refusal_of(rig, item):
-    """Why a mesh cannot be skinned, as a UserError; None where it can."""
+    """UserError that says why a mesh cannot be skinned; else None."""
     reason = object_references.refusal(item)
     if reason is not None:
         return reason
@@ -69,7 +69,7 @@ def refusal_of(rig, item):
 
 @contextmanager
 def at_rest(context, rig):
-    """The armature shows its rest for as long as the block runs."""
+    """Context manager: sets the armature to its Rest Position."""
     shown = rig.data.pose_position
     rig.data.pose_position = "REST"
     context.view_layer.update()
@@ -81,7 +81,7 @@ def at_rest(context, rig):
 
 
 def bones_of(af, rig):
-    """All bones of the armature at rest, in its coordinates, as the library takes them."""
+    """All bones of the armature at rest, in its coordinates, as af.Bone."""
     numbers = {bone.name: index for index, bone in enumerate(rig.data.bones)}
     found = []
     for bone in rig.data.bones:
@@ -103,7 +103,7 @@ def bones_of(af, rig):
 
 
 def rest_of(rig):
-    """What bones are at rest, comparable."""
+    """Comparable rest pose of the bones."""
     return [
         (
             bone.name,
@@ -117,7 +117,7 @@ def rest_of(rig):
 
 
 def limits_of(bone):
-    """(3, 2) the least and the largest turn about each axis of a posed bone; None where it has none."""
+    """(3, 2) lower and upper rotation limit per axis of a pose bone, in radians; None without limits."""
     limits, has_any = np.array([[-FREE, FREE]] * 3), False
     sources = [(bone, "use_ik_limit_{}", "ik_min_{}", "ik_max_{}")]
     sources += [

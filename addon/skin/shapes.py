@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes at rest as they are skinned, in the armature's coordinates, and what their groups hold."""
+"""Meshes at rest to skin, in the armature's coordinates, and the weights of their vertex groups."""
 
 from dataclasses import dataclass
 
@@ -16,16 +16,16 @@ from ..stiffness import painted
 
 @dataclass
 class Shape:
-    """One mesh object; its shape is that which its armature modifier gets, or would."""
+    """One mesh object; its shape is the input of its Armature modifier, present or future."""
 
     reference: ObjectReference
     arrays: mesh_arrays.MeshArrays
     vertices: np.ndarray  # (n, 3) in the armature's coordinates
     triangles: np.ndarray
-    to_rig: np.ndarray  # (4, 4) from the object's
-    nearest: np.ndarray | None  # (own vertices,) of these; None where they are the mesh's own
-    kept: dict  # bone → (own vertices,) weights that stay
-    stiffness: tuple  # (n,) factors of the stiffness, and of that against bending; None each where all are 1
+    to_rig: np.ndarray  # (4, 4) object's → armature's coordinates
+    nearest: np.ndarray | None  # (own vertices,) index into `vertices`; None if these are the mesh's own
+    kept: dict  # {bone: (own vertices,) weights to keep}
+    stiffness: tuple  # (n,) factors of stiffness, of bending stiffness; each None if all are 1
     mark: tuple
 
     def own(self, weights):
@@ -33,7 +33,7 @@ class Shape:
         return weights if self.nearest is None else weights[self.nearest]
 
     def get(self, rig):
-        """The object; UserError where its mesh is another by now, or lies elsewhere beside the bones."""
+        """The object; UserError if its mesh, or its placement relative to the armature, has changed."""
         item = self.reference.get()
         is_there = is_in_place(transform(to_armature(item, rig), self.arrays.vertices), self.vertices)
         if mesh_arrays.fingerprint(item.data) != self.mark or not is_there:
@@ -42,7 +42,7 @@ class Shape:
 
 
 def place(item, rig):
-    """Where the armature's modifier is in the object's stack, or would come."""
+    """Index of the Armature modifier in the object's stack, or the index to insert it at."""
     stack = list(item.modifiers)
     found = next((k for k, m in enumerate(stack) if m.type == "ARMATURE" and m.object == rig), None)
     if found is not None:
@@ -54,7 +54,7 @@ def place(item, rig):
 
 
 def read(context, item, rig, groups):
-    """The Shape of an object while the armature is at rest; UserError where there is nothing to skin."""
+    """The Shape of an object while the armature is at rest; UserError if there is nothing to skin."""
     refuse(painted.refusal(item))
     to_rig = to_armature(item, rig)
     before = [m for m in list(item.modifiers)[: place(item, rig)] if m.show_viewport]
@@ -79,14 +79,14 @@ def read(context, item, rig, groups):
 
 
 def to_armature(item, rig):
-    """(4, 4) from an object's coordinates into the armature's; UserError where a scale flattens one."""
+    """(4, 4) from an object's coordinates into the armature's; UserError if either matrix is singular."""
     for one in (item, rig):
         space_of(matrix_of(one), one.name)
     return inverse(matrix_of(rig)) @ matrix_of(item)
 
 
 def nearest(vertices, points):
-    """(p,) which of (n, 3) vertices each point is nearest to."""
+    """(p,) index of the vertex, of (n, 3), that is nearest to each point."""
     tree = KDTree(len(vertices))
     for index, vertex in enumerate(vertices):
         tree.insert(vertex, index)
@@ -95,8 +95,8 @@ def nearest(vertices, points):
 
 
 def kept_weights(item, rig, groups):
-    """{bone: (own vertices,) weights} of the groups that stay: locked ones, or all that hold any vertex where
-    `groups` is KEEP."""
+    """{bone: (own vertices,) weights} of the groups that stay: locked ones, and with `groups` KEEP all that
+    are not empty."""
     deforming = {bone.name for bone in rig.data.bones if bone.use_deform}
     own = [group for group in item.vertex_groups if group.name in deforming]
     locked = {group.name for group in own if group.lock_weight}
@@ -109,8 +109,8 @@ def kept_weights(item, rig, groups):
 
 
 def fill_up(weights, kept, names, influences, points):
-    """(n, bones) weights whose kept columns stay, and whose others share what these leave of one. One of the
-    (n, 3) points that none of them holds is held as the nearest one that is."""
+    """(n, bones) weights: the kept columns stay, the others are scaled to a sum of 1 with them. Of the (n, 3)
+    points, one without weights gets those of the nearest point that has some."""
     if not kept:
         return weights
     fixed = [names.index(bone) for bone in kept]
@@ -130,14 +130,14 @@ def fill_up(weights, kept, names, influences, points):
 
 
 def join(shapes):
-    """((n, 3) vertices, (m, 3) triangles, the first vertex of each) of all shapes as one mesh."""
+    """((n, 3) vertices, (m, 3) triangles, index of each shape's first vertex) of all shapes as one mesh."""
     firsts = np.cumsum([0, *(len(shape.vertices) for shape in shapes)])
     rows = [shape.triangles + first for shape, first in zip(shapes, firsts, strict=False)]
     return np.concatenate([shape.vertices for shape in shapes]), np.concatenate(rows), firsts
 
 
 def joined_stiffness(shapes):
-    """((n,) factors of the stiffness of all shapes together, and of that against bending); None for ones."""
+    """[(n,) factors of stiffness, of bending stiffness] of all shapes as one mesh; None for ones."""
     joined = []
     for parts in zip(*(shape.stiffness for shape in shapes), strict=True):
         ones = [np.ones(len(shape.vertices)) for shape in shapes]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Weights as vertex groups, and correctives as shape keys whose drivers are plain formulas.
+"""Writes weights to vertex groups, and correctives to shape keys with simple driver expressions.
 
-Blender evaluates such formulas itself: they play where Python may not run, and without the extension.
+Blender evaluates simple expressions without Python, so they work with auto-run off and without the extension.
 """
 
 import bpy
@@ -15,16 +15,16 @@ from .shapes import place
 
 LEAST_OFFSET = 1e-5  # of the shape's size; a corrective that moves a mesh by less is left out
 QUATERNION = "wxyz"
-PRODUCTS = ("w*x", "w*y", "w*z", "x*x", "y*y", "z*z", "x*y", "x*z", "y*z")  # as af.Corrective has them
+PRODUCTS = ("w*x", "w*y", "w*z", "x*x", "y*y", "z*z", "x*y", "x*z", "y*z")  # in the order of af.Corrective
 
 
 def write_weights(item, names, weights, kept):
-    """Puts (n, bones) weights into the bones' groups; those of `kept` stay as they are."""
+    """Writes (n, bones) weights to the bones' vertex groups; groups of `kept` stay."""
     single_user(item)
     columns = dict(zip(names, np.asarray(weights).T, strict=True))
     used = {name for name, column in columns.items() if column.any() or name in item.vertex_groups}
     if any(m.type == "MIRROR" and m.use_mirror_vertex_groups for m in item.modifiers):
-        # Mirror finds the other side's group by its name, and has no other where it is not there.
+        # Mirror finds the other side's group by its name: that group must exist.
         used |= {bpy.utils.flip_name(name) for name in used}
     for name, column in columns.items():
         if name in used and name not in kept:
@@ -32,7 +32,7 @@ def write_weights(item, names, weights, kept):
 
 
 def follow(item, rig):
-    """The armature poses the object: by the modifier it has, or a new one; and it goes where that goes."""
+    """Makes the armature deform the object, by its modifier or a new one, and parents it to the armature."""
     modifier = next((m for m in item.modifiers if m.type == "ARMATURE" and m.object == rig), None)
     if modifier is not None:
         modifier.use_vertex_groups = True
@@ -47,7 +47,7 @@ def follow(item, rig):
 
 
 def takes_correctives(item, shape):
-    """Whether shape keys can move the vertices that are skinned."""
+    """Whether shape keys can move the skinned vertices."""
     keys = item.data.shape_keys
     return shape.nearest is None and (keys is None or keys.use_relative) and not item.show_only_shape_key
 
@@ -61,7 +61,7 @@ def remove_correctives(item):
 
 
 def add_correctives(item, rig, shape, rows, correctives, names):
-    """Shape keys of these rows of the correctives' offsets; returns how many there are."""
+    """Adds shape keys with these rows of the correctives' offsets; returns their number."""
     back, size = np.linalg.inv(shape.to_rig[:3, :3]), np.ptp(shape.vertices, axis=0).max()
     count = 0
     for number, corrective in enumerate(correctives, 1):
@@ -74,14 +74,14 @@ def add_correctives(item, rig, shape, rows, correctives, names):
         key = item.shape_key_add(name=f"{CORRECTIVE}{number} {bone}", from_mix=False)
         basis = mesh_arrays.vectors(key.relative_key.data, "co").astype(np.float64)
         mesh_arrays.put_vectors(key.data, basis + offsets @ back.T, "co")
-        key.slider_min, key.slider_max = -1.0, 1.0  # no farther than in the poses that were seen
+        key.slider_min, key.slider_max = -1.0, 1.0  # the range of the sampled poses
         drive(key, rig, bone, corrective.coefficients)
         count += 1
     return count
 
 
 def drive(key, rig, bone, coefficients):
-    """The key's value becomes this polynomial of the bone's own turn, a unit quaternion."""
+    """Drives the key's value by this polynomial of the bone's local rotation, a unit quaternion."""
     driver = key.driver_add("value").driver
     driver.type = "SCRIPTED"
     for component in QUATERNION:
@@ -95,7 +95,7 @@ def drive(key, rig, bone, coefficients):
 
 
 def formula(coefficients):
-    """Of at most 255 characters, which is what a driver holds."""
+    """The driver expression, at most 255 characters, Blender's limit."""
     for digits in (7, 4):
         terms = [f"{c:+.{digits}g}*{product}" for c, product in zip(coefficients, PRODUCTS, strict=True)]
         text = "".join(terms).removeprefix("+")

@@ -12,18 +12,18 @@ from ..core.errors import UserError
 from . import landmarks
 
 AROUND = np.arange(0, 2 * np.pi, np.pi / 4)
-# Pixels about a click in which a surface is found: scans have holes, and ends of limbs are thin.
+# Offsets in pixels around a click that are searched for a surface: scans have holes, and limbs are thin.
 OFFSETS = [np.zeros(2), *(r * np.array([np.cos(a), np.sin(a)]) for r in (3, 6, 9, 12) for a in AROUND)]
-NAVIGATION = (110, 320)  # pixels that Blender's gizmos of navigation take in the view's upper right corner
+NAVIGATION = (110, 320)  # size in pixels of the navigation gizmos in the view's upper right corner
 
 
 def covers(region, spot):
-    """Whether a region has that pixel of the window."""
+    """Whether a region contains that pixel of the window."""
     return 0 <= spot[0] - region.x < region.width and 0 <= spot[1] - region.y < region.height
 
 
 def is_navigation(context, region, spot):
-    """Whether a pixel of the window is among the view's gizmos of navigation."""
+    """Whether a pixel of the window is on the view's navigation gizmos."""
     space, scale = context.area.spaces.active, context.preferences.system.ui_scale
     if not (space.show_gizmo and space.show_gizmo_navigate):
         return False
@@ -74,7 +74,7 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def click(self, context, event):
-        """Takes a click, also one on neither object; False where it belongs to what lies over the view."""
+        """Handles a click, also beside both objects; False if it belongs to another region or a gizmo."""
         spot = event.mouse_x, event.mouse_y
         whole = next(r for r in context.area.regions if r.type == "WINDOW")
         if not covers(whole, spot) or any(covers(r, spot) for r in context.area.regions if r != whole):
@@ -89,7 +89,7 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
         return True
 
     def struck(self, context, region, pixel):
-        """(which, place) of the surface at a pixel, else of the nearest about it; (None, None) for none."""
+        """(index of the end, location) of the surface under a pixel or near it; else (None, None)."""
         view, graph = context.area.spaces.active.region_3d, context.evaluated_depsgraph_get()
         scale = context.preferences.system.ui_scale
         for offset in OFFSETS:
@@ -103,7 +103,7 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
         return None, None
 
     def take_back(self):
-        """The half of a pair that was clicked, else the last pair."""
+        """Removes the clicked half of a pair, else the last pair."""
         source = self.ends[0].get()
         count = len(settings_of(source).wrap.landmarks)
         if self.clicked:

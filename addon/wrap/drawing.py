@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each pair of landmarks in the viewport: its number on a disc of its colour, at both ends."""
+"""Draws each pair of landmarks in the viewport: its number on a disc of its colour, at both ends."""
 
 import blf
 import bpy
@@ -32,7 +32,7 @@ def draw():
 
 
 def disc(context, spot, colour, text):
-    """A number on a disc about a pixel, dark or bright, whichever is read on the colour."""
+    """Draws a number on a disc around a pixel, dark or bright by the colour's luminance."""
     scale, shader = context.preferences.system.ui_scale, gpu.shader.from_builtin("UNIFORM_COLOR")
     for shade, radius in ((DARK, RADIUS + 1.5), ((*colour, 1.0), RADIUS)):
         rim = spot + radius * scale * CIRCLE

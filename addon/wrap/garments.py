@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a wrapped object carries, fitted to the target: clothes and props, at their distance from it."""
+"""Fits copies of a wrapped object's carried clothes and props to the target, at the same distance."""
 
 import numpy as np
 from mathutils import Matrix
@@ -23,14 +23,14 @@ from ..names import COPY_OF
 from ..results.result_objects import retarget
 from . import rigs
 
-PLACING = ("location", "rotation_", "scale", "delta_")  # channels of where the copied object was
+PLACING = ("location", "rotation_", "scale", "delta_")  # data paths of transform channels
 
 
 def copies(context, source, target, given, own):
-    """(count, notes): a copy for the target of each object that the source carries.
+    """Copies each carried object of the source for the target; returns (count, notes).
 
-    `given`: what the source has, whose triangles face as the target's do. `own`: the target's vertices and
-    triangles.
+    `given`: the source's Given, with its triangles oriented as the target's. `own`: the target's vertices
+    and triangles.
     """
     world, there = matrix_of(source), matrix_of(target)
     wrapped, onto = (facing(triangles, there) for triangles in (given.triangles, own[1]))
@@ -65,7 +65,7 @@ def copies(context, source, target, given, own):
 
 
 def placed(context, source, item, entry, body):
-    """(4, 4) matrix of what is carried as a whole: it grows as the body does there, about its middle."""
+    """(4, 4) world matrix of an object carried as a whole: scaled about its center as the body is there."""
     depsgraph = depsgraph_of(context)
     basis = TransformCarrier(context, item).basis(item, entry, depsgraph)
     rigs = modifier_stack.handle_rigs(source)
@@ -103,7 +103,7 @@ def fitted(context, source, item, body):
 
 
 def copy_of(item, target, posing):
-    """The copy that an earlier transfer made, or a new one."""
+    """The copy from an earlier transfer, or a new one."""
     for parent in (target, *posing.values()):
         for child in parent.children:
             if child.get(COPY_OF) == item.name:
@@ -123,7 +123,7 @@ def copy_of(item, target, posing):
 
 
 def put(context, copied, target, matrix, shape, posing):
-    """Where it belongs: a child of the target, or of the same bone of its armature as what was copied."""
+    """Parents and places a copy: on the target, or on the bone of its armature that the original has."""
     rig, bone = bone_of(copied, posing)
     copied.parent, copied.parent_type = (target, "OBJECT") if rig is None else (rig, "BONE")
     if rig is not None:
@@ -144,7 +144,7 @@ def put(context, copied, target, matrix, shape, posing):
 
 
 def bone_of(copied, posing):
-    """(armature of the target, name of a bone) on which a copy is to hang; (None, "") where on none."""
+    """(the target's armature, name of the bone) to parent a copy to; (None, "") without one."""
     item = copied
     while item.parent is not None:
         rig = posing.get(item.parent, item.parent if item.parent in posing.values() else None)

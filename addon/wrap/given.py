@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a wrapped mesh has to hand on, read in one go: nothing is written while it is there."""
+"""The data of a wrapped mesh to transfer, read at once; nothing is written meanwhile."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from ..core.geometry.spaces import facing, mirrors
 from ..names import OFFSETS, TURNS
 from . import keys
 
-# Attributes' types: (name of a value in Blender, numbers a value, whether values between two make sense).
+# {attribute type: (RNA name of the value, numbers per value, whether values can be interpolated)}.
 TYPES = {
     "FLOAT": ("value", 1, True),
     "FLOAT2": ("vector", 2, True),
@@ -23,7 +23,7 @@ TYPES = {
     "INT8": ("value", 1, False),
     "BOOLEAN": ("value", 1, False),
 }
-# Marks of edges: attributes by name, their types.
+# Edge marks: {attribute name: type}.
 EDGE_MARKS = {
     "uv_seam": "BOOLEAN",
     ".uv_seam": "BOOLEAN",
@@ -48,7 +48,7 @@ class Layer:
         return TYPES[self.data_type][2]
 
     def put(self, mesh, values):
-        """Gives a mesh this attribute with other values."""
+        """Writes values to a mesh as this attribute."""
         old = mesh.attributes.get(self.name)
         if old is not None and (old.domain, old.data_type) != (self.domain, self.data_type):
             mesh.attributes.remove(old)
@@ -108,6 +108,7 @@ class Given:
         ]
 
     def mirror(self, matrix):
-        """(3, 3) for the shape at rest, so that no mirror lies on the way; triangles face out after it."""
+        """(3, 3) reflection to apply to the rest shape if `matrix` mirrors, so that the whole map does not;
+        orients the triangles outwards."""
         self.triangles, self.corners = (facing(one, matrix) for one in (self.triangles, self.corners))
         return np.diag([-1.0 if mirrors(matrix) else 1.0, 1.0, 1.0])

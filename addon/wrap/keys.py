@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shape keys that a target gets, with their values.
+"""Transfers shape keys, with their values, to a target.
 
-A wrap lays onto the target what is seen, with the values of keys. The same values would move the target a
-second time: one further key takes back those of the wrap. At them the target keeps its shape.
+A wrap fits the evaluated shape, with its keys' values, to the target. On the target the same values would
+move it a second time: one more key subtracts their motion, so that the target keeps its shape at them.
 """
 
 import json
@@ -18,7 +18,7 @@ from ..names import NEUTRAL_KEY
 
 
 def of(source):
-    """The keys to hand on, without the basis and what takes back values of its own."""
+    """The keys to transfer: all but the Basis and NEUTRAL_KEY."""
     keys = source.data.shape_keys
     if keys is None:
         return []
@@ -26,7 +26,7 @@ def of(source):
 
 
 def refusal(source, target):
-    """Why the keys of a source cannot be carried over, as a UserError; None where they can."""
+    """UserError that says why the keys of a source cannot be transferred; else None."""
     for item in (source, target):
         if item.data.shape_keys is not None and not item.data.shape_keys.use_relative:
             return UserError(
@@ -40,7 +40,7 @@ def refusal(source, target):
 
 
 def shown(source):
-    """{name: how much of each key is in the shape that is seen}."""
+    """{name: value} of the keys that act in the evaluated shape."""
     blocks, values = of(source), {}
     if source.show_only_shape_key:
         block = source.active_shape_key
@@ -51,7 +51,7 @@ def shown(source):
 
 
 def since_wrapped(source):
-    """{name: value} of the keys as the source was wrapped with them; None where they are as they were."""
+    """{name: value} of the keys at the time of the wrap; None if these have not changed."""
     kept = settings_of(source).wrap.shown_keys
     values = json.loads(kept) if kept else {}
     if not kept or values == shown(source):
@@ -60,7 +60,7 @@ def since_wrapped(source):
 
 
 def shape_at(context, item, kept, values):
-    """(n, 3) vertices as these modifiers of an object make them, where keys have these values by name."""
+    """(n, 3) vertices of an object with the modifiers `kept` and the keys at `values`, {name: value}."""
     mesh = item.data.copy()
     try:
         with modifier_stack.staged(context, item, kept) as (copied, layer):
@@ -76,7 +76,7 @@ def shape_at(context, item, kept, values):
 
 
 def offsets(source):
-    """(k, n, 3) of the keys, each from where it starts."""
+    """(k, n, 3) offsets of the keys, each from the key that it is relative to."""
     blocks = of(source)
     if not blocks:
         return np.empty((0, len(source.data.vertices), 3))
@@ -87,7 +87,7 @@ def offsets(source):
 
 
 def carry(source, target, displacements):
-    """Gives the target keys of these displacements (k, m, 3), as the source has; returns how many."""
+    """Makes the source's keys on the target with these displacements (k, m, 3); returns their number."""
     blocks = of(source)
     if not blocks:
         return 0
@@ -103,7 +103,7 @@ def carry(source, target, displacements):
     shapes = {block: points_of(made[block]) for block in (basis, *locked)}
 
     def shape_of(block):
-        """Keys may be relative to others that are made here too."""
+        """(m, 3) points of a key, recursively, as keys may be relative to other new ones."""
         if block not in shapes:
             start = basis if block in from_basis else start_of[block]
             shapes[block] = shape_of(start) + carried[block]
@@ -119,7 +119,7 @@ def carry(source, target, displacements):
 
 
 def is_in_circle(block):
-    """Whether a key is relative to itself, maybe by way of others."""
+    """Whether a key is relative to itself, directly or through other keys."""
     passed, start = set(), block.relative_key
     while start not in passed and start != block:
         passed.add(start)
@@ -136,7 +136,7 @@ def key_named(target, name):
 
 
 def take_back(source, target):
-    """The key that takes back the values of the wrap; call it once the target has its groups."""
+    """Makes the key that subtracts the values of the wrap; call it after the target has its vertex groups."""
     kept, keys = settings_of(source).wrap.shown_keys, target.data.shape_keys.key_blocks
     values = json.loads(kept) if kept else shown(source)
     moved = {keys[block.name]: values[block.name] for block in of(source) if values.get(block.name)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Landmarks: pairs of Empties, one on the source at rest and one on the target, which move with these."""
+"""Landmarks: pairs of Empties, parented to the source at rest and to the target."""
 
 import re
 
@@ -15,11 +15,11 @@ from ..handles.empties import make_empty, matrix_of
 from ..handles.palette import free_colour
 from ..pin_tool import places
 
-SIZE = 0.02  # of an Empty, as a share of the object's
+SIZE = 0.02  # of an Empty, as a share of the object's diagonal
 
 
 def target_of(source, name=""):
-    """The object that a source is wrapped onto; UserError where there is none that will do."""
+    """The object that a source is wrapped onto; UserError without a suitable one."""
     target = bpy.data.objects.get(name) if name else settings_of(source).wrap.onto
     if name and target is None:
         raise UserError("There is no object {name}", name=name)
@@ -31,7 +31,7 @@ def target_of(source, name=""):
 
 
 def read_target(context, target, space):
-    """(n, 3) vertices and (m, 3) triangles of the target as it is shown, in solve space."""
+    """(n, 3) vertices and (m, 3) triangles of the evaluated target, in solve space."""
     mesh = mesh_arrays.read(context, target)
     refuse(mesh_arrays.nothing_in(target.name, len(mesh.vertices), len(mesh.triangles)))
     to_solve = space.world_to_solve @ matrix_of(target)
@@ -41,7 +41,7 @@ def read_target(context, target, space):
 
 
 def refusal(source):
-    """Why there is nothing to wrap onto, as a UserError; None where there is."""
+    """UserError that says why a source has no target; else None."""
     try:
         target_of(source)
     except UserError as error:
@@ -50,20 +50,20 @@ def refusal(source):
 
 
 def used(source):
-    """The entries whose Empties are both there."""
+    """The entries with both Empties in a scene."""
     return [e for e in settings_of(source).wrap.landmarks if in_scene(e.rest) and in_scene(e.on_target)]
 
 
 def world_vertices_at_rest(context, source):
-    """(n, 3) vertices of the shape that a field works on, in the world."""
+    """(n, 3) world vertices of the shape before the field."""
     return transform(matrix_of(source), mesh_arrays.read(context, source, in_place=True).vertices)
 
 
 def read(source, space, seen=None, rest=None):
     """[(rest, on_target)] in solve space, (3,) each.
 
-    `seen` and `rest`, (n, 3) in the world: the shape that the landmarks were put on, and the one to be
-    wrapped, where a pose lies between. A landmark goes with its nearest vertex.
+    `seen` and `rest`, (n, 3) in the world: the posed shape that the landmarks were put on, and the unposed
+    one to wrap. A landmark moves by the difference at its nearest vertex.
     """
     pairs = []
     is_posed = seen is not None and len(seen) == len(rest) and not np.array_equal(seen, rest)
@@ -77,13 +77,13 @@ def read(source, space, seen=None, rest=None):
 
 
 def place(context, source, target, rest, on_target):
-    """A new pair at the places of both surfaces that are nearest to two in the world, (3,) each."""
+    """Adds a pair at the surface points nearest to two world locations, (3,) each."""
     at_rest = places.find(context, source, rest, 0.0).rest
     return add(context, source, target, (at_rest, places.find(context, target, on_target, 0.0).now))
 
 
 def add(context, source, target, pair):
-    """A new pair at these places in the world: of the source at rest, of the target."""
+    """Adds a pair at these world locations: on the source at rest, on the target."""
     number = len(settings_of(source).wrap.landmarks) + 1
     ends = [
         empty_at(context, source, pair[0], f"Landmark {number}"),
@@ -98,7 +98,7 @@ def add(context, source, target, pair):
 
 
 def empty_at(context, owner, where, name):
-    """An Empty at a place in the world that moves with its owner."""
+    """A new Empty at a world location, parented to its owner."""
     world = matrix_of(owner)
     corners = transform(world, np.array(owner.bound_box))
     size = SIZE * float(np.linalg.norm(np.ptp(corners, axis=0))) or 1.0
@@ -111,7 +111,7 @@ def empty_at(context, owner, where, name):
 
 
 def mirror(context, source):
-    """The pairs again across both objects' X; returns how many: none in the middle, nor twice."""
+    """Mirrors the pairs across both objects' X axes, except those with a pair there; returns their number."""
     target, flip = target_of(source), np.diag([-1.0, 1.0, 1.0, 1.0])
     worlds = [matrix_of(source), matrix_of(target)]
     pairs = [[matrix_of(item)[:3, 3] for item in (e.rest, e.on_target)] for e in used(source)]
@@ -136,7 +136,7 @@ def remove(source, index):
 
 
 class Marks:
-    """Which rows of the list of landmarks a wrap leaves out."""
+    """The rows of the list of landmarks that a wrap leaves out."""
 
     def __init__(self, source):
         entries = list(settings_of(source).wrap.landmarks)
@@ -144,7 +144,7 @@ class Marks:
         self.rows = [entries.index(entry) for entry in used(source)]
 
     def numbered(self, text):
-        """Landmarks by their number in the list."""
+        """Replaces "landmarks[i]" in a text by the number in the list."""
         return re.sub(r"landmarks\[(\d+)\]", lambda match: f"#{self.rows[int(match[1])] + 1}", text)
 
     def put(self):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a target lies on the object that was wrapped onto it, and what that makes of the object's keys."""
+"""Correspondence of a target's vertices to the object wrapped onto it, and its keys on the target."""
 
 import json
 
@@ -15,10 +15,10 @@ from ..names import NEUTRAL_KEY
 from . import keys
 from .given import Given
 
-LEAST_POSE = 1e-5  # of the target's size: an armature at rest moves by less, by rounding
-FAR = 0.05  # of the target's diagonal: a wrap leaves half of the vertices nearer than that
-OFF = 0.01  # of the target's diagonal: a vertex farther away does not lie on the wrapped shape
-LOOKED_AT = 1000  # vertices at most, to see how far two surfaces are apart
+LEAST_POSE = 1e-5  # of the target's size: above the rounding of an armature at rest
+FAR = 0.05  # of the target's diagonal: most median distance after a wrap
+OFF = 0.01  # of the target's diagonal: farther vertices are off the wrapped shape
+LOOKED_AT = 1000  # most vertices to measure the distance of two surfaces
 
 
 def keeps_vertices(modifier):
@@ -26,25 +26,25 @@ def keeps_vertices(modifier):
 
 
 def seen(context, source, target, is_posed):
-    """(n, 3) vertices of the target as a wrap sees them, by its own keys, and by its modifiers or not."""
+    """(n, 3) target vertices as wrapped onto: with its own keys, and with its modifiers if `is_posed`."""
     blocks, own = target.data.shape_keys, mesh_arrays.positions(target.data)
     kept = [one for one in target.modifiers if is_posed and one.show_viewport and keeps_vertices(one)]
     if not kept and blocks is None:
         return own
-    given = {NEUTRAL_KEY, *(block.name for block in keys.of(source))}  # the wrap was without these
+    given = {NEUTRAL_KEY, *(block.name for block in keys.of(source))}  # made after the wrap
     values = dict.fromkeys(given & set(blocks.key_blocks.keys() if blocks else ()), 0.0)
     shape = keys.shape_at(context, target, kept, values)
     return shape if len(shape) == len(own) else own
 
 
 def mark_of(target):
-    """A text that is equal while the target's own vertices and faces are where they were."""
+    """Fingerprint of the target's own vertices and faces, as text."""
     digest, faces = mesh_arrays.fingerprint(target.data)
     return f"{digest.hex()} {faces}"
 
 
 class Wrapped:
-    """What a wrap is made with, kept for a later transfer."""
+    """The input of a wrap, stored for a later transfer."""
 
     def __init__(self, source, target):
         self.ends = ObjectReference(source), ObjectReference(target)
@@ -57,17 +57,17 @@ class Wrapped:
 
 
 def beside(source, target):
-    """(4, 4) from the coordinates of a source to those of its target."""
+    """(4, 4) from a source's local coordinates to its target's."""
     return np.linalg.inv(matrix_of(target)) @ matrix_of(source)
 
 
 def distance(points, surface):
-    """How far from a surface half of the points are at most."""
+    """Median distance of the points from a surface."""
     return np.median(np.abs(surface(points[:: -(-len(points) // LOOKED_AT)])))
 
 
 class Match:
-    """One source and one target: read on the main thread, compared on any."""
+    """Match of one source and one target: read on the main thread, computed on any."""
 
     def __init__(self, context, source, target, with_keys):
         self.ends = ObjectReference(source), ObjectReference(target)
@@ -81,7 +81,7 @@ class Match:
         self.offsets = keys.offsets(source) if with_keys else None
 
     def find(self, tracker):
-        """Finds the places of the target's vertices, and the displacements (k, m, 3) of its keys."""
+        """Finds the target vertices' correspondence, and the displacements (k, m, 3) of its keys."""
         with_keys = self.offsets is not None
         task = tracker.start("Comparing", 0.3 if with_keys else 1.0)
         wrapped = native.library().MeshSdf(self.moved, self.given.triangles)
@@ -91,7 +91,7 @@ class Match:
         self.displacements = self.carried(tracker.start("Shape Keys", 1.0)) if with_keys else None
 
     def get(self):
-        """The source and the target; UserError where one is not as it was read."""
+        """The source and the target; UserError if one has changed since it was read."""
         source, target = (end.get() for end in self.ends)
         is_there = is_in_place(self.moved_beside(source, target), self.moved)
         has_same_keys = self.offsets is None or np.array_equal(keys.offsets(source), self.offsets)
@@ -102,13 +102,13 @@ class Match:
         return source, target
 
     def moved_beside(self, source, target):
-        """(n, 3) vertices of the wrapped source in the target's coordinates, as keys are."""
+        """(n, 3) vertices of the wrapped source in the target's local coordinates."""
         return transform(beside(source, target), self.given.moved)
 
     def met(self, wrapped):
-        """The target's vertices as they were wrapped onto: a pose may have come after the wrap.
+        """The target's vertices at the time of the wrap: unposed or posed, whichever is nearer.
 
-        UserError where most of the wrapped source and most of the target lie far from the other.
+        UserError if most vertices of the wrapped source and of the target are far from each other.
         """
         distances = [distance(vertices, wrapped) for vertices in (self.unposed, self.posed)]
         own = self.unposed if distances[0] <= distances[1] else self.posed
@@ -122,7 +122,7 @@ class Match:
         return own
 
     def off(self, wrapped):
-        """[UserError] where vertices of the target, which was edited since, are not where it was wrapped."""
+        """[UserError] if vertices of the target, edited since the wrap, are off the wrapped source."""
         far = OFF * np.linalg.norm(np.ptp(self.own, axis=0))
         count = np.count_nonzero(np.abs(wrapped(self.own)) > far)
         if not count:
@@ -136,12 +136,12 @@ class Match:
         return [edited]
 
     def places_of(self, vertices, triangles, task=None):
-        """Where the vertices of a mesh lie on the wrapped source."""
+        """The native Correspondence of a mesh's vertices to the wrapped source."""
         rest = self.given.rest @ self.mirror, self.given.triangles
         return native.library().Correspondence(self.moved, rest, (vertices, triangles), task=task)
 
     def carried(self, task):
-        """(k, m, 3) of the source's keys: what poses the target poses these too."""
+        """(k, m, 3) displacements of the source's keys, posed as the target is."""
         carried = self.places.displacements(self.offsets @ self.mirror, task=task)
         if np.abs(self.own - self.unposed).max() <= LEAST_POSE * np.ptp(self.own, axis=0).max():
             return carried

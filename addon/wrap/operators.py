@@ -54,11 +54,11 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
 
     @classmethod
     def refuses(cls, source):
-        """As the settings ask; a script may name another target."""
+        """Checks the settings' target only in the user interface: a script may name another one."""
         return super().refuses(source) or (landmarks.refusal(source) if has_window() else None)
 
     def clear_up(self, job):
-        """Where nothing came of it, the field's modifier stands again where it did."""
+        """Moves the field's modifier back to its place if the job has failed."""
         for below in self.below:
             below.give_back()
         SolveOperator.clear_up(self, job)
@@ -105,7 +105,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         return self.with_rest(item, marks, wrapped, fitting, below, Followers(context, source))
 
     def with_rest(self, item, marks, wrapped, fitting, below, followers):
-        """The same item, which marks landmarks and moves bones and handles as well."""
+        """The item with an `apply` that also marks landmarks, and moves rest bones and handles."""
 
         def apply(solved):
             said, context, source = item.apply(solved), bpy.context, marks.source.get()

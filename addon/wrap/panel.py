@@ -65,7 +65,7 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
 
 
 def factor_slider(layout, source):
-    """How far the field's modifier takes the object, from rest to the result."""
+    """Draws the modifier's Factor: 0 is the rest shape, 1 the result."""
     modifier = next(iter(modifier_stack.layers(source)), modifier_stack.find(source))
     if modifier is None:
         return

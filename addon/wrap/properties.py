@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a source's wrap is: its target, pairs of landmarks, settings."""
+"""object.arapfields.wrap: a source's target, pairs of landmarks, settings."""
 
 import bpy
 
@@ -23,7 +23,7 @@ def is_target(group, item):
 
 
 def row_chosen(wrap, context):
-    """Both Empties of the pair are selected."""
+    """Update callback: selects both Empties of the pair."""
     if wrap.active_landmark < len(wrap.landmarks):
         pair = wrap.landmarks[wrap.active_landmark]
         for item in (pair.on_target, pair.rest):
@@ -32,7 +32,7 @@ def row_chosen(wrap, context):
 
 
 def forget_target(wrap, context):
-    """Another target was not wrapped onto yet."""
+    """Update callback: drops the mark of the last target."""
     wrap.target_mark = ""
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Armatures that a target has of its own, and what reads them: drivers, modifiers, constraints."""
+"""Copies of armatures for a target, and their references in drivers, modifiers and constraints."""
 
 import bpy
 
@@ -8,7 +8,7 @@ from ..blender.object_references import settings_of
 
 
 def pairs(source, target):
-    """{armature of the source: that of the target}."""
+    """{armature of the source: that of the target}, by modifiers of the same name."""
     both = [(given, target.modifiers.get(given.name)) for given in source.modifiers]
     return {
         given.object: there.object
@@ -18,7 +18,7 @@ def pairs(source, target):
 
 
 def twins(source, target):
-    """{what the source has: what the target has for it}, of objects and their data."""
+    """{object or data of the source: its counterpart of the target}."""
     own = {source: target, source.data: target.data}
     for given, there in pairs(source, target).items():
         own |= {given: there, given.data: there.data}
@@ -31,14 +31,14 @@ def copied(rig, target):
     own.data = rig.data.copy()
     own.name = f"{rig.name} {target.name}"
     own_action(own)
-    settings_of(own).rest_bones = ""  # its bones were nowhere else
+    settings_of(own).rest_bones = ""  # its bones are not fitted
     for home in target.users_collection:
         home.objects.link(own)
     return own
 
 
 def copy_drivers(source, target):
-    """The same drivers on the keys of the same names; what they read of the source, they read of its twin."""
+    """Copies the drivers of the source's keys; references to the source become those to its twin."""
     given, keys = source.data.shape_keys, target.data.shape_keys
     if given.animation_data is None:
         return
@@ -55,7 +55,7 @@ def copy_drivers(source, target):
 
 
 def copy_property(given, there, path):
-    """What a driver reads of a twin, where that is a custom property that the twin lacks."""
+    """Copies a custom property that a driver reads to a twin that lacks it."""
     name = bpy.utils.unescape_identifier(path[2:-2]) if path.startswith('["') else ""
     if name in given and name not in there:
         there[name] = given[name]

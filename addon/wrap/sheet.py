@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A page of small pictures of wrapped objects with their figures, the worst first."""
+"""Contact sheet: thumbnails of wrapped objects with their distances, the worst first."""
 
 import json
 from pathlib import Path
@@ -21,7 +21,7 @@ from . import landmarks, transfer
 
 
 def report_of(source):
-    """What the wrap that the object shows has reached; UserError where it shows none."""
+    """The report of the object's wrap; UserError without one."""
     report = json.loads(source.get(REPORT, "{}"))
     if transfer.not_wrapped(source) or "to_target_mean" not in report:
         raise UserError("Wrap {name} first, with Modifier as its result", source)
@@ -29,7 +29,7 @@ def report_of(source):
 
 
 def upright(context, item):
-    """(vertices, triangles) of an object as shown in the world, with y up."""
+    """(vertices, triangles) of an evaluated object in world space, turned to y up."""
     with modifier_stack.mesh_of(context, item, list(item.modifiers)) as mesh:
         mesh = mesh_arrays.arrays_of(item, mesh)
     world = matrix_of(item)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pairs of landmarks proposed by shape, to be looked at and moved."""
+"""Proposes pairs of landmarks by shape, for the user to check and move."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a wrapped object has, carried over to its target: shape keys, groups, attributes, edges, armature."""
+"""Transfers a wrapped object's data to its target: shape keys, groups, attributes, edges, armature."""
 
 import numpy as np
 from mathutils.kdtree import KDTree
@@ -14,18 +14,18 @@ from ..core.settings.choices import TRANSFERRED
 from ..results.placement import single_user
 from . import garments, keys, rigs
 
-LEAST_WEIGHT = 1e-4  # what is below is no member of a group
+LEAST_WEIGHT = 1e-4  # vertices below it are not assigned to a group
 
 
 def not_wrapped(source):
-    """Why a source has nothing to hand on yet, as a UserError; None where it has."""
+    """UserError if a source has no wrap to transfer from; else None."""
     if modifier_stack.top(source) is None:
         return UserError("Wrap {name} first, with Modifier as its result", source)
     return None
 
 
 def refusal(source, target):
-    """Why nothing can be carried over, as a UserError; None where it can."""
+    """UserError that says why nothing can be transferred; else None."""
     if reason := not_wrapped(source):
         return reason
     if target.library is not None or target.data.library is not None:
@@ -38,7 +38,7 @@ def refusal(source, target):
 
 
 class Transfer:
-    """What is carried goes from the first's wrapped mesh to the second's own, as a Match has found it."""
+    """Transfers data from the source's wrapped mesh to the target's own mesh, by a Match."""
 
     def __init__(self, context, source, target, match):
         self.context, self.source, self.target, self.match = context, source, target, match
@@ -46,7 +46,7 @@ class Transfer:
         self.notes = []
 
     def carry(self, kinds):
-        """Carries the kinds over; returns how many of each by label."""
+        """Transfers these kinds of data; returns {label: count}."""
         single_user(self.target)
         steps = {
             "KEYS": self.keys,
@@ -90,7 +90,7 @@ class Transfer:
         return len(self.given.attributes)
 
     def edges(self):
-        """Seams, sharp edges, creases and the like."""
+        """Transfers seams, sharp edges, creases and other edge marks."""
         mesh, done = self.target.data, 0
         edges = np.empty(2 * len(mesh.edges), np.int32)
         mesh.edges.foreach_get("vertices", edges)
@@ -133,7 +133,7 @@ class Transfer:
         return len(self.given.uv_maps)
 
     def armature(self):
-        """A rig of the target's own; only where the wrap fitted the bones to the wrapped shape."""
+        """Gives the target a copy of the armature, if its bones are fitted to the wrapped shape."""
         if not settings_of(self.source).under_rig:
             return 0
         done = 0
@@ -161,6 +161,6 @@ class Transfer:
 
 
 def message(target, counts, notes):
-    """What was carried, as the line to report."""
+    """The line that reports what was transferred."""
     listed = ", ".join([*(f"{translated(label)}: {count}" for label, count in counts.items()), *notes])
     return translated("{name} has {what}", name=target.name, what=listed)
