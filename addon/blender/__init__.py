@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Thin helpers on bpy, which know no feature."""
+"""Thin helpers on bpy, independent of the features."""

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves of actions, in all versions of Blender."""
+"""F-curves of actions, in all supported versions of Blender."""
 
 import bpy
 
 
 def bags_of(action):
-    """What holds an action's curves: from Blender 4.4 on the channel bags of its layers' strips."""
+    """The owners of an action's F-curves: from Blender 4.4 on the channel bags of its layers' strips."""
     for layer in getattr(action, "layers", ()):
         for strip in layer.strips:
             yield from getattr(strip, "channelbags", ())
@@ -14,8 +14,8 @@ def bags_of(action):
 
 
 def remove_curves(owner, is_removed):
-    """Removes those curves of the owner's action of which `is_removed(curve)` holds, and the action where
-    nothing is left of it."""
+    """Removes the F-curves of the owner's action for which `is_removed(curve)` is true, and the action if it
+    is empty then."""
     action = owner.animation_data.action if owner.animation_data is not None else None
     if action is None:
         return
@@ -33,30 +33,30 @@ def remove_curves(owner, is_removed):
 
 
 def own_action(owner):
-    """Gives a copy an action of its own, where it has one."""
+    """Makes the action of a copied data-block single-user, if it has one."""
     data = owner.animation_data
     if data is not None and data.action is not None:
         data.action = data.action.copy()
 
 
 def has_keys(item, path):
-    """Whether an object's own action moves properties whose path begins like that."""
+    """Whether an object's own action has F-curves whose data path starts with `path`."""
     data = item.animation_data
     action = data.action if data is not None else None
     return action is not None and any(curve.data_path.startswith(path) for curve in curves_of(action))
 
 
 def curves_of(action):
-    """An action's curves."""
+    """An action's F-curves, of all slots."""
     for bag in bags_of(action):
         yield from bag.fcurves
 
 
 def pace(scene):
-    """How far its animation goes on from one frame of a scene to the next; 1 unless frames are remapped."""
+    """Animation frames per scene frame, by the render settings' Time Stretching; 1 by default."""
     return scene.render.frame_map_old / scene.render.frame_map_new
 
 
 def key_at(owner, path, frame, **given):
-    """Inserts a keyframe of what is to be seen at a frame of the scene."""
+    """Inserts a keyframe that takes effect at a frame of the scene, whatever its Time Stretching."""
     owner.keyframe_insert(path, frame=frame * pace(bpy.context.scene), **given)

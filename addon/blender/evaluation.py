@@ -1,27 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender has evaluated of the scene.
+"""The depsgraph of the scene, and evaluated world matrices.
 
-`context.evaluated_depsgraph_get()` crashes where a script's temp_override() is in force: up to Python 3.11 it
-reads that without Python's lock while a worker has it. The window's own events are never in one.
+`context.evaluated_depsgraph_get()` crashes within a script's temp_override(): up to Python 3.11 it reads the
+override without the GIL while a worker holds it. The window's own events never have an override.
 """
 
 import bpy
 
 
 def depsgraph_of(context):
-    """What Blender has evaluated last; nothing is evaluated for it."""
+    """The view layer's depsgraph as evaluated last; does not evaluate it."""
     return context.view_layer.depsgraph or updated(context.view_layer)
 
 
 def updated(layer):
-    """A view layer's depsgraph, evaluated anew where anything has changed."""
+    """A view layer's depsgraph, evaluated after the last changes."""
     layer.update()
     return layer.depsgraph
 
 
 def is_disabled(item):
-    """Whether Blender leaves an object of the file as it is, and after a load at the origin: disabled in
-    viewports, by itself or with all its collections, or left out of the view layer."""
+    """Whether Blender does not evaluate an object, which after a load is at the origin: disabled in
+    viewports, by itself or with all its collections, or excluded from the view layer."""
     layer = bpy.context.view_layer
     if item.visible_get(view_layer=layer):
         return False
@@ -30,7 +30,7 @@ def is_disabled(item):
 
 
 def enabled(layer_collection):
-    """The collections of a view layer, from that one down, whose objects Blender evaluates."""
+    """The collections of a view layer whose objects Blender evaluates, from `layer_collection` down."""
     if layer_collection.collection.hide_viewport:
         return
     if not layer_collection.exclude:
@@ -40,12 +40,12 @@ def enabled(layer_collection):
 
 
 def world_matrix(item):
-    """Where an object is, also where Blender leaves it as it is."""
+    """An object's world matrix, also if Blender does not evaluate it."""
     return item.matrix_world if item.is_evaluated or not is_disabled(item) else own_matrix(item)
 
 
 def own_matrix(item):
-    """The world matrix of an object by its own transforms and its parents', while nothing else moves it."""
+    """The world matrix of an object by its own transform and its parents', if nothing else moves it."""
     if is_moved(item):
         return item.matrix_world
     if item.parent is None:
@@ -54,16 +54,16 @@ def own_matrix(item):
 
 
 def is_moved(item):
-    """Whether an object's place is more than what its own transforms and its parent's say."""
+    """Whether an object's world matrix depends on more than its own transform and its parent's."""
     return is_driven(item) or (item.parent is not None and item.parent_type != "OBJECT")
 
 
 def is_driven(item):
-    """Whether keys, drivers or constraints may move an object."""
+    """Whether keyframes, drivers or constraints may move an object."""
     data = item.animation_data
     return bool(item.constraints or (data and (data.action or data.drivers or data.nla_tracks)))
 
 
 def is_animated(item):
-    """Whether keys, drivers or constraints may move an object, or what it is a child of."""
+    """Whether keyframes, drivers or constraints may move an object or one of its ancestors."""
     return is_driven(item) or (item.parent is not None and is_animated(item.parent))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The user's guide: its pages in tooltips, and by a right click on a button or a setting."""
+"""Links to the user's guide: in tooltips, and as Online Manual in the context menus of buttons."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from ..names import CONTEXT
 from .language import translated
 
 ADDON = Path(__file__).resolve().parents[1]
-FOLDERS = ((ADDON / "guide", "html"), (ADDON.parent / "docs/guide", "md"))  # as shipped; in a clone
+FOLDERS = ((ADDON / "guide", "html"), (ADDON.parent / "docs/guide", "md"))  # in the extension; in a clone
 SETTINGS = {  # class of properties → page
     "ARAPFIELDS_PG_fit": "surface",
     "ARAPFIELDS_PG_deform": "deform",
@@ -40,20 +40,20 @@ LABELS = {
     "motion": "Secondary Motion",
     "jobs": "Status",
 }
-pages = {}  # pattern of Blender's names → page, while the extension is on
+pages = {}  # {RNA pattern: page}, while the extension is enabled
 
 
 class Guided:
-    """Mixin of operators: `guide` is the page that explains them, which their tooltips name.
+    """Mixin of operators: `guide` is the page that explains them, named in their tooltips.
 
-    Where `obstacle` has a reason they are greyed out, and the tooltip says it.
+    If `obstacle` gives a reason, the operator is greyed out and the tooltip shows it.
     """
 
     guide = ""
     bl_translation_context = CONTEXT
 
     def __init_subclass__(cls):
-        """ARAPFIELDS_OT_fit is arapfields.fit, which names.py lists."""
+        """Sets bl_idname by the class name: ARAPFIELDS_OT_fit is arapfields.fit; names.py lists them."""
         super().__init_subclass__()
         if cls.__name__.startswith("ARAPFIELDS_OT_"):
             cls.bl_idname = cls.__name__.replace("ARAPFIELDS_OT_", "arapfields.")
@@ -67,7 +67,7 @@ class Guided:
 
     @classmethod
     def obstacle(cls, context):
-        """Why the operator cannot run now, as a UserError; None where it can."""
+        """UserError that says why the operator cannot run now; else None."""
         return None
 
     @classmethod
@@ -77,7 +77,7 @@ class Guided:
 
 
 def begin(classes):
-    """Tells Blender the pages of all registered operators and settings."""
+    """Registers the manual map: pages of all registered operators and settings."""
     for cls in classes:
         if getattr(cls, "guide", ""):
             pages[f"bpy.ops.{cls.bl_idname}"] = cls.guide
@@ -92,6 +92,6 @@ def end():
 
 
 def manual_map():
-    """(address of the guide, (pattern, page's file) each), as Blender asks for it."""
+    """(URL prefix of the guide, ((RNA pattern, page's file), ...)), the format of register_manual_map."""
     folder, ending = next((entry for entry in FOLDERS if entry[0].is_dir()), FOLDERS[0])
     return f"{folder.as_uri()}/", tuple((pattern, f"{page}.{ending}") for pattern, page in pages.items())

@@ -1,25 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of the styles, loaded once."""
+"""Preview icons of the styles, loaded once."""
 
 from pathlib import Path
 
 import bpy.utils.previews
 
 FOLDER = Path(__file__).resolve().parents[1] / "icons"
-_collections = []  # one, while the extension is on
-_drawn = {}  # name → key of what was drawn last
+_collections = []  # one preview collection, while the extension is enabled
+_drawn = {}  # {name: key of the image drawn last}
 
 
 def icon(identifier):
-    """The number of a style's picture; 0 where there is none."""
+    """The icon_id of a style's image; 0 without one."""
     if not _collections or identifier not in _collections[0]:
         return 0
     return _collections[0][identifier].icon_id
 
 
 def drawn(name, key, size, pixels):
-    """The number of a picture that is made while Blender runs; `pixels()`, (size, size, 4) from below, is
-    asked where the last of that name had another key. 0 where there are no pictures."""
+    """The icon_id of an image drawn at run time, cached by name and key; `pixels()` returns (size, size, 4)
+    from the bottom row up. 0 if icons are not loaded."""
     if not _collections:
         return 0
     pictures = _collections[0]

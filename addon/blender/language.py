@@ -10,7 +10,7 @@ _lookup = getattr(bpy.app.translations, "pgettext_rpt", bpy.app.translations.pge
 
 
 def translated(message, **values):
-    """A template with its values, or an error, as the user should read it; other text as it is."""
+    """A template with its values, or an error, in the user's language; other text unchanged."""
     if isinstance(message, UserError):
         message, values = message.template, message.values
     elif isinstance(message, Exception):
@@ -21,7 +21,7 @@ def translated(message, **values):
 
 
 def about(name, message):
-    """The same with the name of what it is about before it, unless the message says that itself."""
+    """The translated message with its object's name in front, unless it contains the name already."""
     text = translated(message)
     is_said = text.startswith((f"{name}: ", f"{name} "))
     if is_said or (isinstance(message, UserError) and message.says(name)):

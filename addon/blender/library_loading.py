@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In a window the native library is loaded beside the events: the first look at the panel stays quick."""
+"""Loads the native library on a thread in Blender with a window, so that the panel's first draw is quick."""
 
 import bpy
 
@@ -8,7 +8,7 @@ from . import timers
 from .host import has_window
 from .redraw import redraw
 
-INTERVAL = 0.1  # seconds between looks whether it is there
+INTERVAL = 0.1  # seconds between checks whether it is loaded
 
 
 def poll_loading():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes as arrays: what Blender shows of an object (modifiers, shape keys), and meshes from arrays."""
+"""Evaluated meshes (modifiers, shape keys) as arrays, and meshes from arrays."""
 
 import hashlib
 from bisect import bisect_left
@@ -20,12 +20,12 @@ class MeshArrays:
 
     vertices: np.ndarray  # (n, 3) float64
     triangles: np.ndarray  # (m, 3) int32
-    has_free_normals: bool = False  # custom normals that do not turn by themselves
-    splats: splat_layouts.Splats | None = None  # where the vertices are those of splats
+    has_free_normals: bool = False  # custom normals that do not rotate with the mesh
+    splats: splat_layouts.Splats | None = None  # if the vertices are splats
 
 
 def vectors(elements, name="vector"):
-    """(n, 3) float32 of a collection whose elements have a vector of that name, as attributes' data have."""
+    """(n, 3) float32 of a collection, e.g. attribute data, whose elements have a vector `name`."""
     flat = np.empty(3 * len(elements), dtype=np.float32)
     elements.foreach_get(name, flat)
     return flat.reshape(-1, 3)
@@ -36,7 +36,7 @@ def put_vectors(elements, values, name="vector"):
 
 
 def position_vectors(mesh):
-    """The collection that holds the positions of a mesh or point cloud, and their name in it."""
+    """(collection, property name) of the positions of a mesh or point cloud."""
     attribute = mesh.attributes.get("position")
     return (points_of(mesh), "co") if attribute is None else (attribute.data, "vector")
 
@@ -47,7 +47,7 @@ def positions(mesh):
 
 
 def fingerprint(mesh):
-    """Equal for a mesh whose own vertices and faces are where they were; modifiers and shape keys aside."""
+    """Comparable fingerprint of a mesh's own vertices and faces, without modifiers and shape keys."""
     digest = hashlib.blake2b(positions(mesh).tobytes(), digest_size=16)
     faces = face_count(mesh)
     if faces:
@@ -56,14 +56,14 @@ def fingerprint(mesh):
 
 
 def set_positions(mesh, points):
-    """Moves the vertices of a mesh and nothing else."""
+    """Sets the positions of a mesh's vertices."""
     elements, name = position_vectors(mesh)
     put_vectors(elements, points, name)
     mesh.update()
 
 
 def corner_vertices(mesh):
-    """(c,) the vertex of each corner of a mesh's faces."""
+    """(c,) vertex index of each face corner of a mesh."""
     corners = np.empty(len(mesh.loops), dtype=np.int32)
     attribute = mesh.attributes.get(".corner_vert")
     if attribute is not None:
@@ -72,7 +72,7 @@ def corner_vertices(mesh):
 
 
 def triangles_of(mesh, face):
-    """(k, 3) corners of the triangles of one of the mesh's faces, as Blender draws it."""
+    """(k, 3) vertex indices of the loop triangles of one of the mesh's faces."""
     mesh.calc_loop_triangles()
     drawn = mesh.loop_triangles  # in the faces' order
     first = bisect_left(range(len(drawn)), face, key=lambda index: drawn[index].polygon_index)
@@ -81,12 +81,12 @@ def triangles_of(mesh, face):
 
 
 def triangles(mesh):
-    """(m, 3) corners of the mesh's triangles, its larger faces split as Blender draws them."""
-    if not face_count(mesh):  # nor is there an attribute of corners then
+    """(m, 3) vertex indices of the mesh's loop triangles."""
+    if not face_count(mesh):  # then there is no corner attribute
         return np.empty((0, 3), dtype=np.int32)
     mesh.calc_loop_triangles()
     corners = corner_vertices(mesh)
-    if len(mesh.loops) == 3 * len(mesh.polygons):  # nothing but triangles: what follows would take its time
+    if len(mesh.loops) == 3 * len(mesh.polygons):  # triangles only: no need to read loop triangles
         return corners.reshape(-1, 3)
     flat = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
     mesh.loop_triangles.foreach_get("loops", flat)
@@ -94,7 +94,7 @@ def triangles(mesh):
 
 
 def refusal(source):
-    """Why there is nothing to work on, as a UserError, as far as it is seen without reading; else None."""
+    """UserError if an object has no geometry, without evaluating it; else None."""
     if source.modifiers or source.mode == "EDIT":
         return None
     return nothing_in_splats(source.name, source.data)
@@ -120,14 +120,14 @@ def flat(name, vertices, triangles):
 
 
 def read(context, source, in_place=False, frame=None):
-    """What there is to work on of an object, at the frame at hand or another; UserError that names it when
-    there is nothing."""
+    """The MeshArrays of an object at the current frame or another; UserError that names it if it has no
+    geometry."""
     with modifier_stack.evaluated_mesh(context, source, in_place, frame) as mesh:
         return arrays_of(source, mesh)
 
 
 def arrays_of(source, mesh):
-    """What there is to work on of an object's evaluated mesh; UserError when there is nothing."""
+    """The MeshArrays of an object's evaluated mesh; UserError if it has no geometry."""
     arrays = MeshArrays(positions(mesh), triangles(mesh), bool(modifier_stack.free_normals(mesh)))
     refuse(nothing_in_splats(source.name, mesh))
     if not np.isfinite(arrays.vertices).all():
@@ -151,7 +151,7 @@ def new_mesh(name, vertices, topology):
 
 
 def fill(mesh, vertices, topology):
-    """Makes these (n, 3) positions and this topology the mesh's geometry."""
+    """Replaces the mesh's geometry by these (n, 3) positions and this topology."""
     mesh.clear_geometry()
     mesh.vertices.add(len(vertices))
     mesh.edges.add(len(topology.edges))

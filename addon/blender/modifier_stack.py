@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The place of the field's modifier in an object's stack, and the object's shape there.
 
-The shape is that of a copy whose stack is cut, in a scene of its own: nothing of the user's is switched.
+The shape is evaluated on a copy with a shortened stack, in a temporary scene: the user's data are unchanged.
 """
 
 from contextlib import contextmanager
@@ -16,14 +16,14 @@ from .removal import remove_modifier
 from .splat_layouts import holds_splats
 
 STAGE = "arapfields_stage"  # custom property of the scene that holds the copy
-TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")  # what tells a scene's time by its frame
+TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")  # render settings that map frames to time
 FREE_NORMALS = "custom_normal"  # attribute of custom normals; free ones are vectors, Blender 4.5 and later
-# What a new field modifier comes before, at the end of a stack: it refines the shape and follows it.
+# Modifiers at the end of a stack that a new field modifier is put before: they refine the shape.
 REFINING = {"SUBSURF", "MULTIRES", "BEVEL", "SOLIDIFY", "EDGE_SPLIT", "WEIGHTED_NORMAL", "NORMAL_EDIT"}
 REFINING |= {"TRIANGULATE", "WIREFRAME"}
-# Modifiers before which Blender allows those alone that do nothing but deform, as nodes may do more.
+# Modifiers before which Blender allows deform modifiers only; nodes count as others.
 ORIGINAL = {"MULTIRES", "SOFT_BODY"}
-# Modifiers that keep every vertex and its number.
+# Modifiers that keep every vertex and its index.
 KEEPING = {"ARMATURE", "CAST", "CLOTH", "COLLISION", "CORRECTIVE_SMOOTH", "CURVE", "DATA_TRANSFER"}
 KEEPING |= {"DISPLACE", "HOOK", "LAPLACIANDEFORM", "LAPLACIANSMOOTH", "LATTICE", "MESH_CACHE", "MESH_DEFORM"}
 KEEPING |= {"NORMAL_EDIT", "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH", "SOFT_BODY", "SURFACE_DEFORM"}
@@ -50,7 +50,7 @@ def is_field(modifier):
 
 
 def layers(source):
-    """The modifiers of results below the field's, the first one first."""
+    """The modifiers of earlier results below the field's, in stack order."""
     return [modifier for modifier in source.modifiers if is_layer(modifier)]
 
 
@@ -59,25 +59,25 @@ def is_layer(modifier):
 
 
 def top(source):
-    """The object's field modifier, or where there is none its last layer, or None."""
+    """The object's field modifier, else its last layer, else None."""
     return find(source) or next(reversed(layers(source)), None)
 
 
 def place(source):
-    """Where the field modifier is in the stack, or would come: at the cache that plays in its place, else
-    before what only refines the shape, or before the armatures where its rest shape is worked on."""
+    """Index of the field modifier in the stack, or the index for a new one: that of the cache modifier, else
+    before modifiers that only refine the shape, or before armatures if the unposed shape is solved."""
     stack = list(source.modifiers)
     own = next((index for index, one in enumerate(stack) if is_field(one) or is_cache(one)), None)
     if own is not None:
         return own
-    if holds_splats(source):  # what comes after draws them
+    if holds_splats(source):  # later modifiers draw them
         return 0
     last = first_posing(source) if settings_of(source).under_rig else end(stack)
     return max(min(last, first_laid_on(source)), earliest(stack))
 
 
 def end(stack):
-    """Where a modifier comes that deforms what those of a stack make, before those that only refine it."""
+    """Index for a new deform modifier at the end of a stack, before modifiers that only refine the shape."""
     index, least = len(stack), earliest(stack)
     while index > least and (
         stack[index - 1].type in REFINING or getattr(stack[index - 1], "use_pin_to_last", False)
@@ -87,14 +87,14 @@ def end(stack):
 
 
 def first_posing(source):
-    """Where the first modifier stands that poses a source's shape; the stack's length without one."""
+    """Index of the first modifier that poses a source; the stack's length without one."""
     stack = list(source.modifiers)
     return next((index for index, one in enumerate(stack) if is_posing(source, one)), len(stack))
 
 
 def first_laid_on(source):
-    """Where the first modifier stands that lays an object on what the field moves as well, the object that
-    carries it or another one that this carries; the stack's length without one."""
+    """Index of a carried object's first Shrinkwrap modifier onto another object of the same field: its
+    carrier or one that this carries; the stack's length without one."""
     stack, carrier = list(source.modifiers), settings_of(source).carried_by
     moved = [] if carrier is None else [carrier, *(one.item for one in settings_of(carrier).carried)]
     laid = (i for i, one in enumerate(stack) if one.type == "SHRINKWRAP" and one.target in moved)
@@ -102,14 +102,14 @@ def first_laid_on(source):
 
 
 def earliest(stack):
-    """Where nodes can come first in a stack."""
+    """The lowest index for a nodes modifier in a stack."""
     return max((index + 1 for index, one in enumerate(stack) if one.type in ORIGINAL), default=0)
 
 
 def before(source, in_place):
-    """The modifiers that make the shape to work on: those before the place, else all but ours.
+    """The modifiers that make the shape to solve: those before the field's place, else all but the add-on's.
 
-    Without the armatures whose bones are handles: the field does what they would do.
+    Armatures whose bones are handles are left out: the field replaces them.
     """
     stack, rigs = list(source.modifiers), handle_rigs(source)
     kept = stack[: place(source)] if in_place else [m for m in stack if not (is_field(m) or is_cache(m))]
@@ -124,12 +124,12 @@ def handle_rigs(source):
 
 
 def is_replaced(modifier, rigs):
-    """Whether a modifier poses by one of these armatures."""
+    """Whether a modifier is an Armature modifier of one of these armatures."""
     return modifier.type == "ARMATURE" and modifier.object in rigs
 
 
 def is_posing(source, modifier):
-    """Whether an armature poses the object by this modifier, rather than the field by its bones."""
+    """Whether this is an Armature modifier that poses the object, with no handles on its armature's bones."""
     return (
         modifier.type == "ARMATURE"
         and modifier.object is not None
@@ -142,12 +142,12 @@ def shown_before(source, in_place):
 
 
 def behind(source):
-    """The modifiers that act on what the field has moved."""
+    """The modifiers after the field's."""
     return [one for one in list(source.modifiers)[place(source) :] if not (is_field(one) or is_cache(one))]
 
 
 def keeps_vertices(source):
-    """Whether the vertices at the field's place are those of the mesh, by number, shown and rendered."""
+    """Whether the vertices at the field's place are the mesh's own, by index, in viewport and render."""
     return all(
         modifier.type in KEEPING or is_layer(modifier)
         for modifier in before(source, in_place=True)
@@ -161,8 +161,8 @@ def is_stage(scene):
 
 @contextmanager
 def evaluated(context, source, kept, frame=None):
-    """(object, depsgraph) of the object with these of its modifiers alone, for as long as the block runs;
-    at a frame other than that at hand where one is given."""
+    """Context manager: (evaluated object, its depsgraph) with the modifiers `kept` only, at the current frame
+    or another."""
     is_whole = all(modifier in kept for modifier in source.modifiers if modifier.show_viewport)
     if is_whole and not is_disabled(source) and frame is None:
         depsgraph = updated(context.view_layer)
@@ -175,7 +175,8 @@ def evaluated(context, source, kept, frame=None):
 
 @contextmanager
 def staged(context, source, kept, frame=None):
-    """(copy, view layer) of the object with these of its modifiers alone, in a scene of its own."""
+    """Context manager: (copy, view layer) of the object with the modifiers `kept` only, in a temporary
+    scene."""
     stage = bpy.data.scenes.new("ARAP Fields")
     copied = None
     try:
@@ -184,7 +185,7 @@ def staged(context, source, kept, frame=None):
         for name in TIME:
             setattr(stage.render, name, getattr(context.scene.render, name))
         layer = stage.view_layers[0]
-        updated(layer)  # the frame is set before there is anything to animate
+        updated(layer)  # the frame is set while the scene is empty
         copied = cut_copy(source, {modifier.name for modifier in kept})
         stage.collection.objects.link(copied)
         if frame is not None:
@@ -198,7 +199,7 @@ def staged(context, source, kept, frame=None):
 
 
 def cut_copy(source, kept):
-    """A copy of the object, which shares its mesh, with these of its modifiers alone."""
+    """A copy of the object that shares its mesh, with the modifiers `kept` only."""
     copied = source.copy()
     copied.hide_viewport = False
     for modifier in list(copied.modifiers):
@@ -209,21 +210,21 @@ def cut_copy(source, kept):
 
 @contextmanager
 def evaluated_mesh(context, source, in_place=False, frame=None):
-    """The mesh that is worked on, for as long as the block runs."""
+    """Context manager: the evaluated mesh of the shape to solve."""
     with mesh_of(context, source, before(source, in_place), frame) as mesh:
         yield mesh
 
 
 @contextmanager
 def moved_mesh(context, source):
-    """The mesh just after the field's modifier, for as long as the block runs."""
+    """Context manager: the evaluated mesh right after the field's modifier."""
     with mesh_of(context, source, list(source.modifiers)[: place(source) + 1]) as mesh:
         yield mesh
 
 
 @contextmanager
 def mesh_of(context, source, kept, frame=None):
-    """The mesh or point cloud as these of its modifiers make it, for as long as the block runs."""
+    """Context manager: the evaluated mesh or point cloud with the modifiers `kept` only."""
     with evaluated(context, source, kept, frame) as (item, depsgraph):
         if source.type == "POINTCLOUD":
             yield item.data
@@ -238,12 +239,12 @@ def mesh_of(context, source, kept, frame=None):
 
 
 def mesh_copy(context, source, in_place=False):
-    """A mesh of its own of the shape that is worked on."""
+    """A new mesh of the shape to solve."""
     with evaluated(context, source, before(source, in_place)) as (item, depsgraph):
         return bpy.data.meshes.new_from_object(item, preserve_all_data_layers=True, depsgraph=depsgraph)
 
 
 def free_normals(mesh):
-    """The domain of free custom normals (POINT, FACE or CORNER), or "" where normals turn by themselves."""
+    """The domain of free custom normals (POINT, FACE or CORNER), or "" if normals rotate with the mesh."""
     normals = mesh.attributes.get(FREE_NORMALS)
     return normals.domain if normals is not None and normals.data_type == "FLOAT_VECTOR" else ""

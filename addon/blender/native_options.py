@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one way from settings by name to the native library's options."""
+"""Converts settings by name to the native library's options structs."""
 
 from ..core.runtime import native
 from ..core.settings.parameters import TABLE, native_options
@@ -7,10 +7,10 @@ from .user_preferences import machine_options
 
 
 def options_of(operation, values, machine=None):
-    """The library's options of an operation of the table, from its settings and those of the machine.
+    """The native options of an operation of the table, from its settings and those of the machine.
 
-    Settings that these options do not have are left out. `machine`: as the preferences had it; None: as they
-    have it now, on the main thread.
+    Settings that the options struct lacks are left out. `machine`: machine_options() read earlier; None
+    reads the preferences, on the main thread only.
     """
     machine = machine_options() if machine is None else machine
     options = getattr(native.library(), TABLE[operation]["struct"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects across ticks of a job: found again by their session's number, never kept as references."""
+"""References to objects across ticks of a job, by session_uid: Python references become invalid."""
 
 import bpy
 
@@ -9,20 +9,20 @@ from .splat_layouts import holds_splats
 
 
 class ObjectReference:
-    """Stands for an object while a job runs; the object may be renamed, undone or deleted meanwhile."""
+    """Refers to an object while a job runs; the object may be renamed, undone or deleted meanwhile."""
 
     def __init__(self, item):
         self.name, self.uid = item.name, item.session_uid
 
     def get(self):
-        """The object; UserError when it is in no scene any more."""
+        """The object; UserError if it is in no scene any more."""
         item = self.find()
         if not in_scene(item):
             raise UserError("{name} was deleted while it was worked on", self)
         return item
 
     def find(self):
-        """The object even where it is in no scene, or None."""
+        """The object, even if it is in no scene; else None."""
         named = bpy.data.objects.get(self.name)
         if named is not None and named.session_uid == self.uid:
             return named
@@ -30,8 +30,8 @@ class ObjectReference:
 
 
 def in_scene(item):
-    """Whether an object is there for the user: one that was deleted stays in the file while anything points
-    to it, but in no scene. Blender finds visible ones at once, others by going through a scene's objects."""
+    """Whether an object is in a scene: a deleted one stays in the file while anything points to it. The test
+    is fast for visible objects; others are searched in the scenes."""
     return item is not None and (item.visible_get() or any(holds(scene, item) for scene in bpy.data.scenes))
 
 
@@ -45,16 +45,16 @@ def settings_of(item):
 
 
 def owner_of(item):
-    """The object that a handle or a result belongs to; None for others, and where that was deleted."""
+    """The source of a handle or a result; None for others, or if the source was deleted."""
     settings = settings_of(item)
     owner = settings.handle_of or (maker_of(item, settings.made_from) if settings.made_from else None)
     return owner if in_scene(owner) else None
 
 
 def maker_of(item, name):
-    """The object of that name, unless it was renamed, that lists this result; None where it is gone.
+    """The source that lists this result: the object called `name` if there is one, else searched; or None.
 
-    No pointer leads from a result to its source: it would drag it along when the result is appended.
+    A result has no pointer to its source, as appending the result would then append the source.
     """
     named = bpy.data.objects.get(name)
     among = bpy.data.objects if named is None else [named]
@@ -66,7 +66,7 @@ def lists(source, item):
 
 
 def is_source(item):
-    """Whether an object is of a kind that is worked on: a mesh, or a point cloud of splats."""
+    """Whether an object can be a source: a mesh, or a point cloud of splats."""
     return item.type == "MESH" or holds_splats(item)
 
 
@@ -98,7 +98,7 @@ def source_of(context):
 
 
 def posed_by(rig, context):
-    """The mesh object that an armature stands for: the one selected with it, else the first that it moves."""
+    """The source of an active armature: the one selected with it, else one that it poses."""
     selected = [item for item in context.selected_objects if is_source(item)]
     if selected:
         return selected[0] if len(selected) == 1 else None
@@ -109,7 +109,7 @@ def posed_by(rig, context):
 
 
 def refusal(item, in_edit_mode=False):
-    """Why an object cannot be worked on, as a UserError; None where it can."""
+    """UserError that says why an object cannot be a source now; else None."""
     if item is None:
         return UserError("Select a mesh object")
     if not is_source(item):
@@ -122,7 +122,7 @@ def refusal(item, in_edit_mode=False):
 
 
 def refusal_of_linked(item):
-    """Why nothing is kept on an object of another file, as a UserError; None where it is the file's own."""
+    """UserError if an object is linked from another file, which cannot store results; else None."""
     if item.library is not None:
         return UserError("{name} is linked from another file; make it local first", item)
     return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What meshes and point clouds have in common: points, and attributes of them."""
+"""Points and point attributes of meshes and point clouds."""
 
 import bpy
 import numpy as np
@@ -20,7 +20,7 @@ def shape_keys_of(data):
 
 
 def selection_of(data):
-    """(n,) which points are selected in Edit Mode."""
+    """(n,) bool: the points that are selected in Edit Mode."""
     chosen = np.zeros(len(points_of(data)), dtype=bool)
     if not isinstance(data, bpy.types.PointCloud):
         data.vertices.foreach_get("select", chosen)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings under a name: the user's own, by Blender's preset system, and those that the library gives."""
+"""Presets of settings: the user's own, by Blender's preset system, and those of the native library."""
 
 import bpy
 from bl_operators.presets import AddPresetBase
@@ -14,9 +14,9 @@ DEFAULT = ("DEFAULT", "Default", "Every setting of this section as it is at firs
 
 
 def preset_classes(name, label, parameters, further=(), given=True):
-    """What stores presets of one section, the menu that lists them, and what sets given ones.
+    """The classes of a section's presets: operator that stores them, menu, operator that applies native ones.
 
-    `further` names settings that are no parameter. `given`: whether the menu begins with the library's own.
+    `further` names settings that are no parameter. `given`: whether the menu starts with the library's.
     """
     menu_name, folder = f"ARAPFIELDS_MT_{name}_presets", f"arapfields/{name}"
     operator = type(
@@ -54,7 +54,7 @@ def preset_classes(name, label, parameters, further=(), given=True):
 
 
 def given_presets(name, label, parameters):
-    """The operator that sets a section to what the library's table of options calls a preset."""
+    """The operator that sets a section to a preset from the library's table of options."""
     table = presets(name)
 
     def execute(self, context):

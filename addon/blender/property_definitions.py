@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parameters as Blender's properties, and the values that count for one call."""
+"""Parameters as Blender properties, and the effective values of an operator call."""
 
 import bpy
 
 from ..names import CONTEXT
 
-listeners = {}  # name of a property → what is called with its group where the user changes it
+listeners = {}  # {name of a property: function called with its group after a change}
 
 
 def tells(name):
-    """The `update` of a property that only its listener understands."""
+    """The `update` callback of a property, which calls its listener."""
     return lambda group, _: listeners[name](group)
 
 
 def colour(description):
-    """One of the viewport."""
+    """A colour property for the viewport."""
     return bpy.props.FloatVectorProperty(
         name="Colour",
         description=description,
@@ -26,7 +26,7 @@ def colour(description):
 
 
 def _kind(definition, *arguments):
-    """The same definition with these arguments, its name and its description by position."""
+    """The bpy.props function with positional `arguments`, name and description."""
     names = (*arguments, "name", "description")
     own = {"translation_context": CONTEXT}
     return lambda *values, **extra: definition(**dict(zip(names, values, strict=True)), **own, **extra)
@@ -37,25 +37,25 @@ integer, number = _kind(bpy.props.IntProperty), _kind(bpy.props.FloatProperty)
 choice = _kind(bpy.props.EnumProperty, "items")
 pointer, collection = _kind(bpy.props.PointerProperty, "type"), _kind(bpy.props.CollectionProperty, "type")
 
-# Of a path that may begin with //; before Blender 4.5 every path may.
+# Option of paths that may start with //; before Blender 4.5 every path may.
 IS_RELATIVE = "is_path_supports_blend_relative"
 RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if IS_RELATIVE in bpy.types.Property.bl_rna.properties else set()
 
 
 def path_text(name, description, kind, options=(), **extra):
-    """A text that is the path of a FILE or a DIR."""
+    """A string property for the path of a FILE or a DIR."""
     return text(name, description, subtype=f"{kind}_PATH", options={*options, *RELATIVE}, **extra)
 
 
 def annotations(parameters, **extra):
-    """Property definitions for a class that shows these parameters."""
+    """{name: property definition} of these parameters."""
     return {p.name: definition(p, **extra) for p in parameters}
 
 
 def group_annotations(parameters):
-    """The same for a group of settings: where 0 stands for something, also a switch and a number above 0.
+    """The same for a PropertyGroup: if 0 has a special meaning, also a switch and a number above 0.
 
-    What is stored, keyed and set by scripts stays the one value.
+    Files, F-curves and scripts use the one value.
     """
     annotated = annotations(parameters)
     for p in parameters:
@@ -65,7 +65,7 @@ def group_annotations(parameters):
 
 
 def switch(p):
-    """On where the value is 0; switched off, it is the one that is offered instead."""
+    """Boolean that is true if the value is 0; switching it off sets the value offered instead."""
     label, meaning, instead = p.zero
 
     def put(group, is_on):
@@ -76,7 +76,7 @@ def switch(p):
 
 
 def number_above_zero(p):
-    """The value, and what is offered instead where it is 0."""
+    """The value, or the one offered instead of 0."""
     least = p.zero[2] / 1000
     return number(
         p.label,
@@ -109,16 +109,16 @@ def definition(parameter, **extra):
 
 
 def effective_values(parameters, group, operator=None):
-    """Values by name: the operator's arguments where given, else the object's settings."""
+    """{name: value}: the operator's arguments if given, else the object's settings."""
     return {p.name: from_single_precision(effective_value(p.name, group, operator)) for p in parameters}
 
 
 def from_single_precision(value):
-    """Blender keeps floats in single precision: 0.01 as 0.0099999998. The number that was meant."""
+    """The decimal number that a single-precision float stands for: 0.01 for 0.0099999998."""
     return float(f"{value:.7g}") if isinstance(value, float) else value
 
 
 def effective_value(name, group, operator):
-    """One setting: the operator's argument where given, else the object's."""
+    """One setting: the operator's argument if given, else the object's."""
     given = operator is not None and operator.properties.is_property_set(name)
     return getattr(operator if given else group, name)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Has parts of the window drawn again."""
+"""Tags regions for redraw."""
 
 from ..names import CATEGORY
 
 
 def redraw(context, *kinds):
-    """Has regions of these kinds of every 3D view drawn again; of sidebars those that show the panel."""
+    """Tags regions of these types in every 3D view for redraw; of sidebars those that show the panel."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

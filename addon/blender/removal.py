@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Taking away what the extension made, together with what nothing else uses then."""
+"""Removes objects and modifiers of the extension with the data-blocks that become unused."""
 
 import bpy
 
 
 def remove_mesh_object(item):
-    """The object, its mesh, and the animation of the mesh's shape keys."""
+    """Removes the object, its mesh, and the action of the mesh's shape keys."""
     mesh = item.data
     keys = mesh.shape_keys
     action = keys.animation_data.action if keys is not None and keys.animation_data else None
@@ -17,7 +17,7 @@ def remove_mesh_object(item):
 
 
 def remove_modifier(modifier):
-    """A modifier. What its inputs name is let go of first: Blender 5.2 would count it as used for ever."""
+    """Removes a modifier; clears its inputs first: Blender 5.2 would keep their data-blocks' users."""
     inputs = getattr(getattr(modifier, "properties", None), "inputs", None)
     for name in inputs.bl_rna.properties.keys() if inputs is not None else ():
         slot = getattr(inputs, name)
@@ -27,7 +27,7 @@ def remove_modifier(modifier):
 
 
 def remove_node_modifier(modifier):
-    """A Geometry Nodes modifier, and its node group."""
+    """Removes a Geometry Nodes modifier, and its node group if that is unused then."""
     group = modifier.node_group
     remove_modifier(modifier)
     if group.users == 0:

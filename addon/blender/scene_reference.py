@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene of a job across its ticks, in which the window may show another one, or which may be deleted."""
+"""Reference to a job's scene across its ticks: the window may switch scenes, or the scene may be deleted."""
 
 import bpy
 
@@ -7,14 +7,15 @@ from ..core.errors import UserError
 
 
 class SceneReference:
-    """Stands for the context's scene and view layer: what Blender evaluates and hides is of those shown."""
+    """Refers to the context's scene and view layer, on which evaluation and visibility depend."""
 
     def __init__(self, context):
         self.name, self.uid = context.scene.name, context.scene.session_uid
         self.layer = context.view_layer.name
 
     def missed(self, context):
-        """The name of what the window shows another of, or ""; UserError where the scene was deleted."""
+        """The name of the scene or view layer that the window no longer shows, or ""; UserError if the scene
+        was deleted."""
         if context.scene.session_uid == self.uid:
             is_other = context.view_layer.name != self.layer and self.layer in context.scene.view_layers
             return self.layer if is_other else ""

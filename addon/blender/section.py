@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every section of the side panel shares."""
+"""Base classes and drawing helpers of the sidebar's panels."""
 
 import bpy
 
@@ -40,7 +40,7 @@ class Advanced(Section):
 
 
 def settings_column(layout, group, parameters, advanced):
-    """The everyday parameters, grey where they do nothing, or the advanced ones that do something."""
+    """Draws the everyday parameters, greyed out if without effect, or the advanced ones with an effect."""
     column, method = layout.column(), method_of(group, parameters)
     for p in parameters:
         is_used = counts(p, group, method)
@@ -55,7 +55,7 @@ def settings_column(layout, group, parameters, advanced):
 
 
 def with_zero(layout, group, parameter):
-    """The switch in the place of 0, and below it the number, grey while that is on."""
+    """Draws the switch that stands for 0, and below it the number, greyed out while the switch is on."""
     column = layout.column(align=True)
     column.row(heading=parameter.label).prop(group, parameter.switch)
     row = column.row()
@@ -70,8 +70,8 @@ def draw_settings(layout, group, *names):
 
 
 def with_room(layout, group, name):
-    """A column for a property, and what it is shown with: switches in a narrow sidebar, and long ones, have
-    the whole width; long names, and names of long choices, a line above."""
+    """(column, arguments of prop()) for a property: switches in a narrow sidebar, and long ones, get the full
+    width; long names, and names of enums with long items, a line above."""
     column, prop = layout.column(align=True), group.bl_rna.properties[name]
     if prop.type == "BOOLEAN":
         column.use_property_split = characters() >= NARROW and not is_long(prop.name, VALUE)
@@ -88,7 +88,7 @@ def with_room(layout, group, name):
 
 
 def switched(layout, group, switch, number):
-    """A switch, and beside it the number that counts while it is on."""
+    """Draws a switch, and beside it the number that it enables."""
     column, name = layout.column(align=True), group.bl_rna.properties[switch].name
     above = is_long(name, NAME)
     if above:
@@ -101,12 +101,12 @@ def switched(layout, group, switch, number):
 
 
 def is_long(text, share):
-    """Whether a text has no room in that share of the sidebar."""
+    """Whether a text is wider than that share of the sidebar."""
     return len(bpy.app.translations.pgettext_iface(text, CONTEXT)) > share * characters()
 
 
 def modifier_row(layout, modifier, icon, remove):
-    """A modifier of ours: its name, where it is seen, and the operator that takes it away."""
+    """Draws a modifier of the add-on: name, visibility, and the operator that removes it."""
     row = layout.row(align=True)
     row.label(text=modifier.name, icon=icon, translate=False)
     for name in ("show_viewport", "show_render"):
@@ -115,7 +115,7 @@ def modifier_row(layout, modifier, icon, remove):
 
 
 def group_row(layout, group, name, source, further=""):
-    """The choice of a vertex group of the source, and below it a number that counts where one is chosen."""
+    """Draws the choice of a vertex group, and below it a setting that is enabled once one is chosen."""
     column, named = with_room(layout, group, name)
     column.prop_search(group, name, source, "vertex_groups", **named)
     if further:
@@ -125,14 +125,14 @@ def group_row(layout, group, name, source, further=""):
 
 
 def note(layout, *reasons):
-    """Says before a button is pressed why it would refuse: the first of these errors that is one."""
+    """Draws the first of these errors that is not None: the reason why a button would refuse."""
     reason = next(filter(None, reasons), None)
     if reason is not None:
         wrapped(layout, translated(reason), icon="INFO")
 
 
 def job_button(layout, operator, icon):
-    """A job's button, and beside it the choice of objects; in their place how far it is while it runs."""
+    """Draws a job's button and its menu of scopes, or the job's progress while it runs."""
     row, job = layout.row(align=True), jobs.running()
     group, name = operator.split(".")
     if job is not None and job.title == getattr(bpy.types, f"{group.upper()}_OT_{name}").title:
@@ -143,13 +143,13 @@ def job_button(layout, operator, icon):
 
 
 def progress_row(row, job):
-    """How far the job is, and the way out."""
+    """Draws the job's progress and the cancel button."""
     row.progress(factor=job.fraction, text=f"{translated(job.title)} {job.fraction:.0%}")
     row.operator(Op.CANCEL, text="", icon="X")
 
 
 def presets(layout, name):
-    """The user's own presets of a section, in its header."""
+    """Draws a section's presets in its header."""
     row = layout.row(align=True)
     row.emboss = "NONE"
     row.menu(f"ARAPFIELDS_MT_{name}_presets", text="", icon="PRESET")
@@ -157,14 +157,14 @@ def presets(layout, name):
     row.operator(f"arapfields.{name}_preset", text="", icon="REMOVE").remove_active = True
 
 
-MARGIN, CHARACTER = 80, 5.6  # pixels beside a label, and of a letter, at a scale of 1
-NARROW = 30  # letters
-NAME, VALUE = 0.385, 0.48  # shares of the letters: beside a value, and within it
-FLAG = 0.56  # the same within a value that has no arrow
+MARGIN, CHARACTER = 80, 5.6  # pixels beside a label, and per character, at UI scale 1
+NARROW = 30  # characters
+NAME, VALUE = 0.385, 0.48  # shares of the sidebar's characters: for a name beside a value, and for a value
+FLAG = 0.56  # the same for a value without an arrow
 
 
 def characters():
-    """Letters of a label for which the region drawn has room; Blender would cut a longer one off."""
+    """Number of characters of a label that fit into the region; Blender truncates longer ones."""
     region = bpy.context.region
     if region is None or region.width < 2:
         return 32
@@ -173,7 +173,7 @@ def characters():
 
 
 def wrapped(layout, text, icon="NONE"):
-    """A long text as several labels, as long as the sidebar is wide."""
+    """Draws a long text as several labels, wrapped at the sidebar's width."""
     import textwrap
 
     column = layout.column(align=True)

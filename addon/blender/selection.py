@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Selecting objects, and rows of lists that are selected together with them."""
+"""Selection of objects, synchronized with active rows of lists."""
 
 import contextlib
 
 
 class Rows:
-    """`quiet`: a row is being chosen by ourselves, which selects nothing."""
+    """`quiet`: the add-on itself sets the active row; update callbacks then select nothing."""
 
     quiet = False
 
@@ -14,10 +14,7 @@ rows = Rows()
 
 
 def select_alone(context, item, extend=False):
-    """Makes an object the active one and, unless it is to `extend` what is, the only one that is selected.
-
-    Not where it cannot be seen.
-    """
+    """Makes an object active and selected, alone unless `extend`; does nothing if it is hidden."""
     layer = context.view_layer
     if context.mode != "OBJECT" or layer.objects.get(item.name) != item or not item.visible_get():
         return
@@ -29,7 +26,7 @@ def select_alone(context, item, extend=False):
 
 @contextlib.contextmanager
 def quietly():
-    """Rows chosen within select nothing."""
+    """Context manager: active rows set within it select nothing."""
     before, rows.quiet = rows.quiet, True
     try:
         yield
@@ -38,13 +35,13 @@ def quietly():
 
 
 def choose_row(settings, index):
-    """Makes that handle's row the chosen one; the selection of objects stays."""
+    """Sets the active row of the handles; the selection of objects stays."""
     with quietly():
         settings.active_handle = index
 
 
 def row_chosen(settings, context):
-    """A row was chosen in the list of handles: its Empty is selected."""
+    """Update callback of the active handle: selects its Empty."""
     handles = settings.handles
     if not rows.quiet and 0 <= settings.active_handle < len(handles):
         empty = handles[settings.active_handle].empty

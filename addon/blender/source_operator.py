@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that work on the panel's source and say before they are pressed why they would refuse."""
+"""Mixins of operators on the panel's source that are greyed out with a reason when they cannot run."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from .object_references import refusal, refusal_of_linked, source_of
 class ReportingOperator(Guided):
     """Mixin: `change(context, source)` does the work and returns the line to report, if any.
 
-    Errors become reports. `source` is the panel's; None where there is none.
+    Errors become reports. `source`: the panel's, or None.
     """
 
     def execute(self, context):
@@ -32,7 +32,7 @@ class ReportingOperator(Guided):
         return {"FINISHED"}
 
     def warn(self, context):
-        """Reports what should not go unseen although the work is done."""
+        """Reports warnings after the work is done."""
 
     def refuse(self, error):
         self.report({"ERROR"}, translated(error))
@@ -40,7 +40,7 @@ class ReportingOperator(Guided):
 
 
 def flat(source):
-    """The UserError of a source whose scale flattens it; None where that is not so, or there is none."""
+    """UserError if a source's scale flattens it; None otherwise, or without a source."""
     try:
         if source is not None:
             space_of(world_matrix(source), source.name)
@@ -50,10 +50,10 @@ def flat(source):
 
 
 class SourceOperator(ReportingOperator):
-    """Mixin: needs a source, to which it applies where `refuses` has no reason."""
+    """Mixin: needs a source for which `refuses` gives no reason."""
 
-    in_edit_mode = False  # whether it works on a source in Edit Mode too
-    of_linked = False  # whether it works on one that is linked, which stays as it is
+    in_edit_mode = False  # whether it also accepts a source in Edit Mode
+    of_linked = False  # whether it also accepts a linked source, which it does not change
 
     @classmethod
     def obstacle(cls, context):
@@ -65,5 +65,5 @@ class SourceOperator(ReportingOperator):
 
     @classmethod
     def refuses(cls, source):
-        """Why the operator does not apply to a source, as a UserError; None where it does."""
+        """UserError that says why the operator does not apply to a source; else None."""
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gaussian splats as importers leave them: point clouds, or meshes of points alone, with these attributes."""
+"""Attribute layouts of imported Gaussian splats, on point clouds or on meshes without faces."""
 
 import numpy as np
 
@@ -8,13 +8,17 @@ from ..names import CHANGES
 from .point_data import face_count
 
 FLOAT, VECTOR, COLOR, QUATERNION, FLOAT4 = "FLOAT", "FLOAT_VECTOR", "FLOAT_COLOR", "QUATERNION", "FLOAT4"
-# How many numbers elements of attributes have, and the property that has them.
+# {attribute type: (numbers per element, RNA property of the value)}.
 NUMBERS = {FLOAT: (1, "value"), VECTOR: (3, "vector"), COLOR: (4, "color")}
 NUMBERS |= {QUATERNION: (4, "value"), FLOAT4: (4, "vector")}
-KIND_OF = {(): FLOAT, (3,): VECTOR, (4,): COLOR}  # of what is added: a quaternion would be made a rotation
-LEAST = 1e-6  # opacity; and what is left to full opacity
-COUNTS = (16, 9, 4, 1)  # of spherical harmonics
-LOGARITHMS = "logarithms"  # of the scales, beside the attributes
+KIND_OF = {
+    (): FLOAT,
+    (3,): VECTOR,
+    (4,): COLOR,
+}  # of changes; a QUATERNION would become a rotation
+LEAST = 1e-6  # least opacity, and least difference from full opacity
+COUNTS = (16, 9, 4, 1)  # numbers of spherical harmonics, by degree from 3 to 0
+LOGARITHMS = "logarithms"  # key of the scales' logarithms, beside the attributes
 
 
 class FileLayout:
@@ -24,13 +28,13 @@ class FileLayout:
     fixed = {f"f_dc_{k}": (FLOAT,) for k in range(3)} | {"opacity": (FLOAT,)}  # {attribute: its types}
 
     def columns(self, attributes):
-        """{attribute: its type} that a motion changes."""
+        """{attribute: its type} of the attributes that a motion changes."""
         rest = sum(name.startswith("f_rest_") for name, _ in attributes.items()) // 3 * 3
         names = [f"rot_{k}" for k in range(4)] + [f"scale_{k}" for k in range(3)]
         return dict.fromkeys([*names, *(f"f_rest_{k}" for k in range(rest))], FLOAT)
 
     def arrays(self, values, fixed):
-        """Arguments of GaussianSplats but for the centers."""
+        """The arguments of GaussianSplats, except the centers."""
         *first, opacity = fixed.values()
         table = np.stack(list(values.values()), axis=1)
         rest = table[:, 7:].reshape(len(table), 3, -1)
@@ -38,14 +42,14 @@ class FileLayout:
         return table[:, :4], np.exp(table[:, 4:7]), 1.0 / (1.0 + np.exp(-opacity)), colours
 
     def begin(self, rest):
-        """Adds to the values at rest what `streams` takes besides."""
+        """Adds derived values to those at rest that `streams` needs."""
 
     def streams(self, values):
-        """Values, or what is added to them, as PreparedSplats.changes() takes them."""
+        """Values, or their changes, in the order of PreparedSplats.changes()."""
         return list(values.values())
 
     def finish(self, rest, changes):
-        """Completes what is added to the values, after it was written to `streams`."""
+        """Completes the changes after the native library has written to `streams`."""
 
 
 class VectorLayout(FileLayout):
@@ -85,7 +89,7 @@ class OwnLayout(FileLayout):
     Not run there: names and types are those of its PLY import. Blender before 5.3 has no FLOAT4.
     """
 
-    mark = "radiance:base"  # colours of the first harmonic, and opacity
+    mark = "radiance:base"  # colours of degree 0, and opacity
     fixed = {mark: (FLOAT4, COLOR)}
 
     def columns(self, attributes):
@@ -128,13 +132,13 @@ def holds_splats(item):
 
 
 def columns_of(mesh):
-    """{attribute: its type} that a motion changes; empty where the mesh holds no splats."""
+    """{attribute: its type} of the attributes that a motion changes; empty without splats."""
     layout = layout_of(mesh)
     return {} if layout is None else layout.columns(mesh.attributes)
 
 
 class Splats:
-    """What a mesh holds of splats, read on the main thread; the library's own are made later."""
+    """A mesh's splat attributes, read on the main thread; `made` converts them to native splats."""
 
     def __init__(self, name, mesh, centers):
         self.layout, columns = layout_of(mesh), columns_of(mesh)
@@ -157,11 +161,11 @@ class Splats:
         self.layout.begin(self.rest)
 
     def made(self, library):
-        """The library's own splats."""
+        """The native GaussianSplats."""
         return library.GaussianSplats(*self.arrays)
 
     def changes(self, prepared, field):
-        """(n, 3) centers that a field moves, and {attribute: what is added to it}."""
+        """((n, 3) centers moved by a field, {attribute: its change})."""
         changes = {key: np.empty_like(values) for key, values in self.rest.items()}
         streams = self.layout.streams
         centers = prepared.changes(field, streams(self.rest), streams(changes))
@@ -183,14 +187,14 @@ def read(name, mesh, key, *kinds):
 
 
 def put_changes(mesh, changes):
-    """Puts what is added to each attribute on the mesh, and takes away what is there besides."""
+    """Stores the changes of each attribute on the mesh, and removes other stored changes."""
     for name in names_of_changes(mesh):
         if name.removeprefix(CHANGES) not in changes:
             mesh.attributes.remove(mesh.attributes[name])
     kinds = {key: KIND_OF[values.shape[1:]] for key, values in changes.items()}
     for key in [key for key in kinds if CHANGES + key not in mesh.attributes]:
         mesh.attributes.new(CHANGES + key, kinds[key], "POINT")
-    there = dict(mesh.attributes.items())  # sought one by one, they take twice as long as they are written
+    there = dict(mesh.attributes.items())  # one lookup per name would take twice as long as writing
     for key, values in changes.items():
         flat = np.ascontiguousarray(values, dtype=np.float32).ravel()
         there[CHANGES + key].data.foreach_set(NUMBERS[kinds[key]][1], flat)
@@ -201,7 +205,7 @@ def names_of_changes(mesh):
 
 
 def changes_of(mesh):
-    """{attribute: what is added to it}; None: nothing is."""
+    """{attribute: its stored change}; None without any."""
     kinds = {name: mesh.attributes[name].data_type for name in names_of_changes(mesh)}
     return {
         key.removeprefix(CHANGES): read(mesh.name, mesh, key, kind) for key, kind in kinds.items()

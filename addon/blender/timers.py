@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one way to be called again: functions that Blender calls between events until they return None."""
+"""Registration of bpy.app.timers: functions that Blender calls between events until they return None."""
 
 import bpy
 
@@ -7,7 +7,7 @@ _started = []
 
 
 def start(function, first=0.0, persistent=False):
-    """Has Blender call `function` after `first` seconds; a `persistent` one goes on when a file is loaded."""
+    """Registers a timer that first runs after `first` seconds; a `persistent` one survives loading a file."""
     if not bpy.app.timers.is_registered(function):
         bpy.app.timers.register(function, first_interval=first, persistent=persistent)
     if function not in _started:
@@ -19,14 +19,14 @@ def running():
 
 
 def clear():
-    """Stops all of them."""
+    """Unregisters all timers of the extension."""
     for function in running():
         bpy.app.timers.unregister(function)
     _started.clear()
 
 
 def start_events(context, seconds):
-    """A timer whose events reach the window's modal operators, so many seconds apart."""
+    """A window timer that sends events to modal operators every `seconds`."""
     return context.window_manager.event_timer_add(seconds, window=context.window)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gives Blender the add-on's translations: each .po file in addon/translations is a language."""
+"""Registers the add-on's translations: each .po file in addon/translations is a language."""
 
 import functools
 import sys
@@ -14,11 +14,11 @@ CONTEXTS = (
     "*",
     "Operator",
     CONTEXT,
-)  # tooltips are looked up in the first, further texts of buttons in the second
+)  # contexts of tooltips, and of other texts of buttons
 
 
 def read_po(path):
-    """{English: translated} of a .po file, wrapped lines included; OSError names a line that is no .po."""
+    """{English: translated} of a .po file, including wrapped lines; OSError names an invalid line."""
     import polib
 
     return {entry.msgid: entry.msgstr for entry in polib.pofile(str(path)).translated_entries()}
@@ -37,7 +37,7 @@ def translations():
 def load():
     try:
         texts = translations()
-    except ModuleNotFoundError:  # the source code was installed, which install_check says
+    except ModuleNotFoundError:  # source code without wheels: install_check reports it
         print("ARAP Fields: polib is missing, so all texts are in English", file=sys.stderr, flush=True)
         texts = {}
     bpy.app.translations.register(PACKAGE, texts)

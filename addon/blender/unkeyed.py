@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Data-blocks as they are while a scene of ours evaluates them at another frame.
+"""Preserves unkeyed values while a temporary scene is evaluated at another frame.
 
-Blender writes what it has evaluated last, in whatever scene, back to the file's own data: poses that are not
-keyed yet would be lost.
+Blender copies the last evaluated values, of any scene, back to the original data-blocks: poses without
+keyframes would be lost.
 """
 
 import contextlib
@@ -13,7 +13,7 @@ from .evaluation import updated
 
 @contextlib.contextmanager
 def kept(context, items):
-    """Puts what is animated of these data-blocks back at the end, and evaluates them as they were."""
+    """Context manager: restores the animated values of these data-blocks at the end, and evaluates them."""
     before = [(item, path, value_at(item, path)) for item in items for path in keyed(item)]
     try:
         yield
@@ -28,7 +28,7 @@ def kept(context, items):
 
 
 def keyed(item):
-    """The paths of a data-block's properties that actions move."""
+    """The data paths of a data-block's F-curves, in its action and NLA strips."""
     data = getattr(item, "animation_data", None)
     if data is None:
         return set()
@@ -38,7 +38,7 @@ def keyed(item):
 
 
 def value_at(item, path):
-    """A copy of the value at a path; None where there is none."""
+    """A copy of the value at a data path; None if the path is invalid."""
     try:
         value = item.path_resolve(path)
     except ValueError:

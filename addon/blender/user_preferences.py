@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on's preferences, read with what counts where there are none."""
+"""The add-on's preferences, with defaults if there are none."""
 
 import os
 import tempfile
@@ -12,7 +12,7 @@ from ..names import PACKAGE
 
 
 def preferences():
-    """The add-on's preferences; None where it runs from its source folder."""
+    """The add-on's preferences; None if it runs from its source folder."""
     entry = bpy.context.preferences.addons.get(PACKAGE)
     return entry.preferences if entry else None
 
@@ -24,13 +24,13 @@ def machine_options():
 
 
 def shows(name):
-    """Whether the preference of that name, show_boxes or show_previews, is on, as it is at first."""
+    """Whether the preference of that name, show_boxes or show_previews, is on, which is the default."""
     stored = preferences()
     return stored is None or getattr(stored, name)
 
 
 def cache_folder():
-    """Where fits are kept: the user's choice, Blender's folder for extensions, or a temporary one."""
+    """Folder of stored fits: the user's choice, the extension's user folder, or a temporary one."""
     stored = preferences()
     if stored and stored.cache_folder:
         return Path(bpy.path.abspath(stored.cache_folder))

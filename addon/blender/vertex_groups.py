@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vertex groups on the surface: weights of samples from the nearest vertices of the mesh as shown."""
+"""Vertex group weights, read in small steps, and interpolated at samples from the nearest vertices."""
 
 import bpy
 import numpy as np
@@ -10,11 +10,11 @@ from ..core.runtime.coroutines import Pause
 from . import modifier_stack
 from .object_references import ObjectReference
 
-BLOCK = 4000  # vertices that are read at once, some milliseconds
+BLOCK = 4000  # vertices read per step, which takes some milliseconds
 
 
 def missing(source, names):
-    """Why a source lacks one of these groups, as a UserError; None where it has them."""
+    """UserError if a source lacks one of these groups; else None."""
     name = next((name for name in names if name not in source.vertex_groups), None)
     return name and UserError("{name} has no vertex group {group}", source, group=name)
 
@@ -66,7 +66,7 @@ def weights_in(mesh, groups):
 
 
 def put(item, name, weights):
-    """Gives the object's group of this name, made where there is none, these weights (n,); 0: no member."""
+    """Writes (n,) weights to the object's group of this name, new if missing; 0 removes a vertex."""
     group = item.vertex_groups.get(name) or item.vertex_groups.new(name=name)
     group.remove(range(len(weights)))
     for index in np.flatnonzero(weights).tolist():
@@ -79,7 +79,7 @@ def at_points(vertices, weights, points):
 
 
 class NearestVertices:
-    """Takes (n,) weights of vertices to points, each from its three nearest vertices by inverse distance."""
+    """Interpolates (n,) vertex values at points, each from its three nearest vertices by inverse distance."""
 
     def __init__(self, vertices, points):
         tree = KDTree(len(vertices))
@@ -94,5 +94,5 @@ class NearestVertices:
         return np.clip(self.blend(weights), 0.0, 1.0)
 
     def blend(self, values):
-        """(p,) of any (n,) values."""
+        """(p,) interpolated values of any (n,) vertex values."""
         return (self.shares * values[self.indices]).sum(axis=1) / self.shares.sum(axis=1)

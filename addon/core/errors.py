@@ -2,10 +2,10 @@
 
 
 class UserError(Exception):
-    """What the user should read: which object, what is wrong, what to do.
+    """An error message for the user: which object, what is wrong, what to do.
 
-    A template with its values, so that the template can be translated where it is shown; {name} is that of
-    `named`, an object or what stands for one.
+    Holds a template and its values, so that the template is translated where it is shown; {name} is the name
+    of `named`, an object or a reference to one.
     """
 
     def __init__(self, template, named=None, **values):
@@ -15,7 +15,7 @@ class UserError(Exception):
         self.template, self.values = template, values
 
     def says(self, name):
-        """Whether the text has a name in it, be it by an error that is quoted."""
+        """Whether the text contains a name, directly or in a nested UserError."""
         return any(
             value.says(name) if isinstance(value, UserError) else value == name
             for value in self.values.values()
@@ -23,7 +23,7 @@ class UserError(Exception):
 
 
 def as_user_error(error):
-    """The same as a UserError; a system's refusal by path and reason, without its number."""
+    """Converts an error to a UserError; an OSError with path and reason, without errno."""
     if isinstance(error, UserError):
         return error
     if isinstance(error, OSError) and error.filename is not None:
@@ -32,6 +32,6 @@ def as_user_error(error):
 
 
 def refuse(reason):
-    """Raises a reason, where there is one."""
+    """Raises the reason unless it is None."""
     if reason is not None:
         raise reason

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A field to be kept: with samples of the surface that it was solved on, in one piece of bytes."""
+"""Serialization of a field, with samples of the surface that it was solved on, to bytes."""
 
 import base64
 import binascii
@@ -15,7 +15,7 @@ from .errors import UserError
 from .geometry.spaces import inverse, transform
 from .runtime import native
 
-KEPT = 4000  # samples at most that tell where the surface is
+KEPT = 4000  # most samples to store
 VERSION = 1
 
 
@@ -35,7 +35,7 @@ class Pose:
 
 
 def to_bytes(pose):
-    """The pose as a file's content."""
+    """The pose as the bytes of an .npz file."""
     points, normals = pose.samples.points, pose.samples.normals
     kept = np.arange(0, len(points), max(1, -(-len(points) // KEPT)))
     with tempfile.TemporaryDirectory() as folder:
@@ -55,7 +55,7 @@ def to_bytes(pose):
 
 
 def from_bytes(content, name):
-    """The pose of a file's content; UserError that names it where that is none."""
+    """The pose from a file's bytes; UserError that names the file if they are invalid."""
     af = native.library()
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Spaces, handles' boxes, meshes as arrays; no bpy."""
+"""Solve space, handles, and meshes as arrays; no bpy."""

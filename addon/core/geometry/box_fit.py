@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Boxes that go with the surface in them."""
+"""Boxes of handles that follow the surface inside them."""
 
 import numpy as np
 
 from .rotations import best_rotation
 
-LEAST = 12  # points of the surface that tell how a pin moves: in its ball's box, or nearest to its middle
-MOST_SCALE = 5.0  # of a side, up and down
+LEAST = 12  # least number of surface points for a pin's motion: in its box, else the nearest ones
+MOST_SCALE = 5.0  # largest scale of a side, and inverse of the smallest
 
 
 def followed_box(box, before, after, is_box=True):
-    """(4, 4) where a box of axes at right angles goes with a surface of (n, 3) points before and after.
+    """(4, 4) box with orthogonal axes that follows a surface, given by (n, 3) points before and after.
 
-    It turns with the points in it, and each side is scaled as they are along it, so that it holds them still;
-    without any it stays. A pin's goes with the nearest points where few are in it, and keeps its size.
+    It rotates with the points inside, and each side is scaled with them, so that it still contains them; an
+    empty box stays. A pin's box follows the nearest points if it contains few, and keeps its size.
     """
     inside = (np.abs((before - box[:3, 3]) @ np.linalg.inv(box[:3, :3]).T) <= 1).all(axis=1)
     if is_box and not inside.any():

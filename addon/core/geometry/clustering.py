@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vertex clustering: a coarse mesh, quick to make and to draw; the vertices in a grid cell become one."""
+"""Vertex clustering: merges the vertices in each grid cell to a coarse mesh that is fast to draw."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ class ClusteredMesh:
 
 
 def cluster_vertices(vertices, triangles, most=MAX_VERTICES):
-    """The mesh itself where it is small; else one vertex a cell, at most `most` of them."""
+    """The mesh itself if it is small; else one vertex per grid cell, at most `most`."""
     if len(vertices) <= most:
         return ClusteredMesh(vertices, np.ascontiguousarray(triangles, dtype=np.int32))
     low, size = vertices.min(axis=0), np.ptp(vertices, axis=0).max() or 1.0
@@ -34,7 +34,7 @@ def cluster_vertices(vertices, triangles, most=MAX_VERTICES):
 
 
 def vertex_normals(vertices, triangles):
-    """(n, 3) unit normals of vertices, by the areas of their triangles; float32."""
+    """(n, 3) unit vertex normals, weighted by triangle area; float32."""
     corners = vertices[triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     flat = triangles.ravel()

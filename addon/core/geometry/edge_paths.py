@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Marked edges of one mesh along the edges of another that lie nearest."""
+"""Transfers marked edges of one mesh to paths of nearby edges on another."""
 
 import heapq
 from collections import defaultdict
 
 import numpy as np
 
-ASIDE = 2.0  # what a detour from the marked edge costs, in lengths of its own
-LONGEST = 3.0  # a path that is so many times as long as its edge is none
+ASIDE = 2.0  # cost of distance from the marked edge, relative to path length
+LONGEST = 3.0  # longest path, relative to its edge; longer ones are dropped
 
 
 def carried_marks(ends, values, nearest, vertices, edges):
-    """(m,) values of a mesh's edges (m, 2): along the shortest ways between the ends of each marked edge.
+    """(m,) values for a mesh's edges (m, 2), along the shortest paths between the ends of each marked edge.
 
-    `ends` (k, 2, 3): the marked edges' ends, and `nearest` (k, 2) the mesh's vertices next to them; `values`
-    (k,) of which the largest counts.
+    `ends` (k, 2, 3): ends of the marked edges; `nearest` (k, 2): the mesh's vertices nearest to them;
+    `values` (k,): of the marked edges; the largest counts where paths overlap.
     """
     about = defaultdict(list)
     for number, (a, b) in enumerate(edges.tolist()):
@@ -28,7 +28,7 @@ def carried_marks(ends, values, nearest, vertices, edges):
 
 
 def path(pair, start, goal, vertices, about):
-    """Numbers of the edges from one vertex to another that stay near a straight line; none where too far."""
+    """Edge indices of the path between two vertices nearest to a straight line; [] if it is too long."""
     if start == goal:
         return []
     along = pair[1] - pair[0]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The edges of a triangle mesh, built on the worker: Blender's own search would block the window."""
+"""Edges of a triangle mesh, built on the worker, as Blender's calc_edges would block the window."""
 
 from dataclasses import dataclass
 
@@ -8,9 +8,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Topology:
-    corners: np.ndarray  # (m, 3) int32 vertices of the triangles
-    edges: np.ndarray  # (e, 2) int32 vertices of the edges, each edge once, the smaller first
-    corner_edges: np.ndarray  # (m, 3) int32 the edge from each corner to the next
+    corners: np.ndarray  # (m, 3) int32 vertex indices of the triangles
+    edges: np.ndarray  # (e, 2) int32 vertex indices of the unique edges, the smaller first
+    corner_edges: np.ndarray  # (m, 3) int32 index of the edge from each corner to the next
 
     def __len__(self):
         return len(self.corners)

@@ -1,28 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a body carries, laid onto the body that it was wrapped onto, at its distance from the skin."""
+"""Fits carried objects of a wrapped body to the target body, at the same distance from its surface."""
 
 import numpy as np
 
-REACH = 0.05  # of the diagonal: distance from the skin beyond which the wrap alone says where things go
-MISSING = 0.02  # of the diagonal: where the other body is farther from the wrapped one, it has a gap
+REACH = 0.05  # of the diagonal: distance from the surface over which the fit fades to the wrap alone
+MISSING = 0.02  # of the diagonal: a target farther from the wrapped body has a gap there
 ROUNDS, SMOOTHINGS = 3, 5
-NEIGHBOURS = 30  # vertices of the body whose growth is that of a thing carried as a whole
-LEAST = 0.5  # of the wanted distance: what is nearer is pushed out without regard to its neighbours
+NEIGHBOURS = 30  # body vertices whose median scale a rigid object takes
+LEAST = 0.5  # of the wanted distance: nearer vertices are pushed out without smoothing
 
 
 class Body:
-    """`wrapped`: (rest, moved, triangles) of what carries, `onto`: (vertices, triangles); in the world."""
+    """`wrapped`: (rest, moved, triangles) of the source, `onto`: (vertices, triangles) of the target; in
+    world space."""
 
     def __init__(self, af, wrapped, onto):
         self.af, (self.rest, self.moved, self.triangles) = af, wrapped
         self.diagonal = float(np.linalg.norm(np.ptp(onto[0], axis=0)))
         self.own, self.other = af.MeshSdf(self.rest, self.triangles), af.MeshSdf(*onto)
         areas = [vertex_areas(shape, self.triangles) for shape in (self.rest, self.moved)]
-        self.scale = np.sqrt(areas[1] / np.maximum(areas[0], 1e-30))  # of each vertex of the one that carries
+        self.scale = np.sqrt(areas[1] / np.maximum(areas[0], 1e-30))  # (n,) at the source's vertices
         self.away = np.abs(self.other(self.moved)) / self.diagonal
 
     def placed(self, rest, now):
-        """How a thing as a whole grows, and its way (3,): `rest` and `now` (3,) are its middle."""
+        """(scale, (3,) translation) of a rigid object; `rest` and `now` (3,) are its center."""
         near = np.linalg.norm(self.rest - rest, axis=1)
         scale = float(np.median(self.scale[np.argsort(near)[:NEIGHBOURS]]))
         wanted, there = float(self.own(rest[None])[0]) * scale, now[None]
@@ -30,8 +31,8 @@ class Body:
         return scale, share * (wanted - float(self.other(there)[0])) * self.other.gradient(there)[0]
 
     def wanted(self, rest, triangles):
-        """(n,) signed distances from the other body that the vertices of a carried mesh are to have, and (n,)
-        how much these count: less far from the skin, and where the other body has none."""
+        """(n,) wanted signed distances of a carried mesh's vertices from the target, and (n,) their weights,
+        which fall off far from the surface and at gaps of the target."""
         body = self.rest, self.triangles
         places = self.af.Correspondence(self.rest, body, (rest, triangles))
         wanted = self.own(rest) * places.values(self.scale)
@@ -39,9 +40,9 @@ class Body:
         return wanted, np.exp(-(off[0] ** 2) - off[1] ** 2)
 
     def fit(self, rest, moved, triangles):
-        """(n, 3) vertices of a carried mesh, from where it is at rest and where the wrap's field takes it.
+        """(n, 3) fitted vertices of a carried mesh, from those at rest and those moved by the wrap's field.
 
-        Vertices that are at one place at rest stay together.
+        Vertices that coincide at rest stay together.
         """
         _, first, joined = np.unique(rest, axis=0, return_index=True, return_inverse=True)
         if len(first) < len(rest):
@@ -60,7 +61,7 @@ class Body:
         return shape
 
     def push_out(self, shape, groups, least):
-        """Moves groups (m, k) of vertices so far out that their middles are `least` (m,) from the body."""
+        """Pushes groups (m, k) of vertices out until their centers are `least` (m,) from the target."""
         outside = np.flatnonzero(least > 0)
         middles = shape[groups[outside]].mean(axis=1)
         lack = least[outside] - self.other(middles)
@@ -74,7 +75,7 @@ class Body:
 
 
 def smoothed(values, edges):
-    """Each vertex's (n, k) value and the mean of its neighbours', half of both."""
+    """(n, k) vertex values, each averaged with the mean of its neighbours."""
     sums, counts = np.zeros_like(values), np.zeros(len(values))
     for here, there in (edges.T, edges.T[::-1]):
         np.add.at(sums, here, values[there])
@@ -83,7 +84,7 @@ def smoothed(values, edges):
 
 
 def vertex_areas(vertices, triangles):
-    """(n,) the area about each vertex."""
+    """(n,) vertex areas: a third of the adjacent triangles'."""
     corners = vertices[triangles]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     return np.bincount(triangles.ravel(), np.repeat(areas, 3), minlength=len(vertices)) / 6

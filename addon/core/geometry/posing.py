@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How carried objects move: whole ones rigidly, bones one by one. Matrices are (4, 4), points (n, 3)."""
+"""Motion of carried objects: rigid ones, and armatures by bone. Matrices are (4, 4), points (n, 3)."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from .spaces import inverse
 
 
 def rigid_motion_of(before, after):
-    """The rigid motion that takes points nearest to those after."""
+    """The rigid motion that fits points to those after, by least squares."""
     motion = np.eye(4)
     motion[:3, :3] = best_rotation(before, after)
     motion[:3, 3] = after.mean(axis=0) - motion[:3, :3] @ before.mean(axis=0)
@@ -16,12 +16,12 @@ def rigid_motion_of(before, after):
 
 
 def frame_points(size=1.0):
-    """(7, 3) points that stand for an object without a shape: its origin and the ends of its axes."""
+    """(7, 3) points for an object without geometry: its origin and the ends of its axes."""
     return size * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
 
 
 def turn_between(before, after):
-    """(3, 3) the rotation nearest to what takes one matrix's axes to the other's."""
+    """(3, 3) the rotation closest to the map of one matrix's axes to the other's."""
     left, _, right = np.linalg.svd(after[:3, :3] @ np.linalg.inv(before[:3, :3]))
     return left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right
 
@@ -36,7 +36,7 @@ def bone_points(poses, lengths):
 
 
 def bone_poses(poses, before, after):
-    """(k, 4, 4) poses of bones whose points move: heads follow, bones point at their moved tails."""
+    """(k, 4, 4) poses of bones by their moved points: heads follow, bones point at their moved tails."""
     before, after = (points.reshape(-1, len(BONE_POINTS), 3) for points in (before, after))
     moved = poses.copy()
     for pose, one, other in zip(moved, before, after, strict=True):
@@ -48,10 +48,10 @@ def bone_poses(poses, before, after):
 
 
 def shortest_turn(a, b):
-    """(3, 3) the rotation that turns the direction of a to that of b the shortest way."""
+    """(3, 3) the smallest rotation from the direction of a to that of b."""
     a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
     axis, cosine = np.cross(a, b), float(a @ b)
-    if cosine < -0.999999:  # nearly opposite: any axis across will do
+    if cosine < -0.999999:  # nearly opposite: any perpendicular axis
         axis = np.cross(a, np.eye(3)[np.abs(a).argmin()])
         axis /= np.linalg.norm(axis)
         return 2 * np.outer(axis, axis) - np.eye(3)
@@ -60,7 +60,7 @@ def shortest_turn(a, b):
 
 
 def posed(rest, parents, bases):
-    """(k, 4, 4) where bones come by their own motions; the other way round than `chained`."""
+    """(k, 4, 4) poses of bones by their own transforms (`matrix_basis`); the inverse of `chained`."""
     poses = np.empty_like(bases)
     for index, parent in enumerate(parents):
         bound = rest[index] if parent < 0 else poses[parent] @ inverse(rest[parent]) @ rest[index]
@@ -69,10 +69,10 @@ def posed(rest, parents, bases):
 
 
 def chained(rest, parents, targets, connected):
-    """(k, 4, 4) the own motions (`matrix_basis`) that pose bones at these targets, parents first in order.
+    """(k, 4, 4) own transforms (`matrix_basis`) that pose bones at these targets; parents come first.
 
-    rest (k, 4, 4) are the bones at rest, `parents` their parents' numbers or -1; a connected bone's head
-    stays at its parent's tail, so that only its turn is taken.
+    `rest` (k, 4, 4): rest bones, `parents`: their parents' indices or -1; a connected bone's head stays at
+    its parent's tail, so that only its rotation is used.
     """
     posed, bases = np.empty_like(targets), np.empty_like(targets)
     for index, parent in enumerate(parents):

@@ -1,26 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a field turns what lies on its points."""
+"""Rotations of a field at points, from its Jacobians."""
 
 import numpy as np
 
 TINY = 1e-12
-STEPS, NEAR = 6, 1e-9  # of Newton's iteration, and the last one's size: its own square is left
+STEPS, NEAR = 6, 1e-9  # Newton iterations; bound on the last step, whose square bounds the error
 
 
 def turns(jacobians, local_to_solve):
     """(n, 3) rotation vectors (axis · angle) in local coordinates, float32, of a field's (n, 3, 3) Jacobians.
 
-    `local_to_solve` is the (4, 4) map into the field's space. The turn is that of the closest rotation.
+    `local_to_solve` is the (4, 4) map into the field's space. Uses the closest rotations.
     """
     linear = np.asarray(local_to_solve)[:3, :3]
     return rotation_vectors(closest(np.linalg.inv(linear) @ jacobians @ linear)).astype(np.float32)
 
 
 def closest(matrices):
-    """(n, 3, 3) the rotations that are closest to matrices, of which most are near one.
+    """(n, 3, 3) the rotations closest to matrices, most of which are nearly rotations.
 
-    Newton's iteration for the polar factor, X ← (X + X⁻ᵀ) / 2 (Higham 1986); by singular values where it has
-    not converged, or leads to a reflection. What is not finite stays so.
+    Newton's iteration for the polar factor, X ← (X + X⁻ᵀ) / 2 (Higham 1986); by SVD if it has not converged
+    or leads to a reflection. Non-finite matrices stay non-finite.
     """
     found = np.ascontiguousarray(np.moveaxis(matrices, 0, -1))
     with np.errstate(all="ignore"):
@@ -37,7 +37,7 @@ def closest(matrices):
 
 
 def cofactors_of(m):
-    """(3, 3, n) the cofactors of (3, 3, n) matrices, and (n,) their determinants."""
+    """(3, 3, n) cofactors of (3, 3, n) matrices, and (n,) their determinants."""
     b, c = [1, 2, 0], [2, 0, 1]
     crosses = [m[i, b] * m[j, c] - m[i, c] * m[j, b] for i, j in ((1, 2), (2, 0), (0, 1))]
     return np.stack(crosses), (m[0] * crosses[0]).sum(axis=0)
@@ -51,7 +51,7 @@ def rotation_vectors(rotations):
     cosine = (np.trace(r, axis1=1, axis2=2) - 1) / 2
     angle = np.arctan2(sine, cosine)
     result = twice / 2 * np.where(sine > TINY, angle / np.maximum(sine, TINY), 1.0)[:, None]
-    half = (cosine < 0) & (sine < 1e-4)  # near π the axis is that of the symmetric part
+    half = (cosine < 0) & (sine < 1e-4)  # near π the axis is taken from the symmetric part
     if half.any():
         outer = (r[half] + np.swapaxes(r[half], 1, 2)) / 2 + np.eye(3)
         longest = np.linalg.norm(outer, axis=1).argmax(axis=1)
@@ -63,7 +63,7 @@ def rotation_vectors(rotations):
 
 
 def best_rotation(before, after):
-    """(3, 3) the rotation that takes (n, 3) points nearest to those after, both about their means."""
+    """(3, 3) the least-squares rotation of (n, 3) points to those after, both about their means (Kabsch)."""
     before, after = before - before.mean(axis=0), after - after.mean(axis=0)
     left, _, right = np.linalg.svd(after.T @ before)
     return left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right

@@ -16,8 +16,8 @@ from .rotations import best_rotation
 
 UNIFORM_SCALE_TOLERANCE = 1e-5  # relative spread of the scales below which they count as equal
 FLAT_SCALE_TOLERANCE = 1e-6  # smallest scale, relative to the largest
-SAME_STRETCH = 1e-6  # noise of a rotation in single precision
-LEAST_MOVE = 1e-4  # of a shape's size: more than what two objects that move together change by rounding
+SAME_STRETCH = 1e-6  # tolerance for the rounding of a rotation in single precision
+LEAST_MOVE = 1e-4  # of a shape's size: above the rounding errors of two objects that move together
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ class Space:
         return transform(inverse(self.local_to_solve), points)
 
     def moved_to_local(self, after, before, local):
-        """(n, 3) solve → local of points that were `before` in solve space and `local` in local coordinates.
+        """(n, 3) solve → local of points `after`, which were `before` in solve space and `local` locally.
 
-        Those that have not moved stay bit for bit, which the way there and back would not leave them.
+        Points that have not moved are copied from `local`, as a round trip would change their last bits.
         """
         if np.array_equal(self.local_to_solve, np.eye(4)):
             return after
@@ -46,19 +46,19 @@ class Space:
         return result
 
     def mirror(self, axis):
-        """(4, 4) world → world: across the plane on which that axis (0, 1 or 2) of solve space is 0."""
+        """(4, 4) world → world reflection across the plane where that axis (0, 1, 2) of solve space is 0."""
         flip = np.eye(4)
         flip[axis, axis] = -1.0
         return self.solve_to_world @ flip @ self.world_to_solve
 
     def is_like(self, other, noise=SAME_STRETCH):
-        """Whether an object is stretched as in another space."""
+        """Whether another space has the same stretch (non-uniform scale)."""
         return np.allclose(self.local_to_solve, other.local_to_solve, rtol=0.0, atol=noise)
 
     def as_at(self, first):
-        """The space of an object that is stretched otherwise than at first, with local → solve as at first.
+        """This space with the local → solve map of `first`, for an object whose stretch has changed since.
 
-        Its shape is then solved as at first, and stretched as a whole: solve → world is no similarity.
+        The shape is solved as in `first` and stretched as a whole: solve → world is no similarity then.
         """
         if self.is_like(first):
             return self
@@ -79,19 +79,19 @@ def transform(matrix, points):
 
 
 def mirrors(matrix):
-    """Whether a 4×4 affine matrix turns left into right."""
+    """Whether a 4×4 affine matrix has a negative determinant."""
     return bool(np.linalg.det(matrix[:3, :3]) < 0.0)
 
 
 def facing(triangles, matrix):
-    """(m, 3) triangles that face the same way after a matrix has moved them, which may mirror."""
+    """(m, 3) triangles with flipped winding if the matrix mirrors, so that they face the same way."""
     return triangles[:, ::-1] if mirrors(matrix) else triangles
 
 
 def inverse(matrix):
-    """The inverse of a 4×4 affine matrix; LinAlgError where it has none.
+    """The inverse of a 4×4 affine matrix; LinAlgError if it is singular.
 
-    By cofactors: NumPy's solver wakes its threads even for this, which costs milliseconds on a busy machine.
+    By cofactors: NumPy's solver starts its threads even for this, which takes milliseconds on a busy machine.
     """
     (a, b, c), (d, e, f), (g, h, i) = matrix[:3, :3].tolist()
     cofactors = (
@@ -109,7 +109,7 @@ def inverse(matrix):
 
 
 def space_of(matrix_world, name="object"):
-    """The solve space of an object with this world matrix; UserError when its scale flattens it."""
+    """The solve space of an object with this world matrix; UserError if its scale is singular."""
     world = np.asarray(matrix_world, dtype=np.float64)
     if not np.isfinite(world).all():
         raise UserError("{name}: its world matrix is not finite", name=name)
@@ -127,9 +127,9 @@ def space_of(matrix_world, name="object"):
 
 
 def unflattened(matrix):
-    """The same matrix; where its scale flattens it, axes that are lost get the scale of the longest, or 1.
+    """The matrix; if it is singular, axes of scale 0 get the scale of the longest one, or 1.
 
-    For frames at which something grows from nothing, or vanishes: no shape is seen there, and any will do.
+    For frames at which an animated scale is 0: nothing is visible there, so any scale will do.
     """
     left, scales, right = np.linalg.svd(matrix[:3, :3])
     lost = scales <= FLAT_SCALE_TOLERANCE * scales[0]
@@ -153,7 +153,7 @@ def pose(matrix):
 
 
 def similarity(before, after):
-    """(4, 4) the proper similarity that takes (n, 3) points nearest to those after."""
+    """(4, 4) the least-squares similarity, without reflection, of (n, 3) points to those after."""
     turn = best_rotation(before, after)
     middles = before.mean(axis=0), after.mean(axis=0)
     turned, moved = (before - middles[0]) @ turn.T, after - middles[1]
@@ -164,10 +164,9 @@ def similarity(before, after):
 
 
 def upright(turn):
-    """(3, 3) axes, as columns, upright in the world; they head where an object with this (3, 3) turn does.
+    """(3, 3) axes, as columns, upright in the world, with the heading of an object with this (3, 3) rotation.
 
-    z is the world's up, whichever of the object's axes points there; x lies level along the object's x, or
-    along its y where x stands on end.
+    z is the world's up; x is horizontal along the object's x, or along its y if x is vertical.
     """
     heading = turn[:, 1 if np.abs(turn[2]).argmax() == 0 else 0] * [1.0, 1.0, 0.0]
     x = heading / np.linalg.norm(heading)
@@ -175,7 +174,7 @@ def upright(turn):
 
 
 def rigid_motion(rest, target):
-    """The proper rigid motion that takes the pose of one matrix to that of the other; scale is ignored."""
+    """(4, 4) the rigid motion, without reflection, of one matrix's pose to the other's; scale is ignored."""
     return _rigid_motion(
         *(np.asarray(matrix, dtype=np.float64).tobytes() for matrix in (rest, target))
     ).copy()
@@ -183,7 +182,7 @@ def rigid_motion(rest, target):
 
 @functools.lru_cache(maxsize=4096)
 def _rigid_motion(rest, target):
-    """As rigid_motion, of bytes: live mode looks at handles that rest again and again."""
+    """rigid_motion of the matrices' bytes, for the cache: live mode reads handles at rest again and again."""
     rest, target = (np.frombuffer(matrix).reshape(4, 4) for matrix in (rest, target))
     motion = pose(target) @ inverse(pose(rest))
     left, _, right = np.linalg.svd(motion[:3, :3])
@@ -194,5 +193,5 @@ def _rigid_motion(rest, target):
 
 
 def is_in_place(points, before):
-    """Whether points (n, 3) are where they were, but for the rounding of objects that move together."""
+    """Whether points (n, 3) are unchanged, up to the rounding of objects that move together."""
     return np.abs(points - before).max() <= LEAST_MOVE * np.ptp(before, axis=0).max()

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Texture coordinates of one mesh for the corners of another, whose faces may cross the seams."""
+"""Transfers UV coordinates to the face corners of another mesh, whose faces may cross seams."""
 
 import numpy as np
 
-CUT = 3.0  # a corner this many times farther off than it should be lies beyond a seam
+CUT = 3.0  # a corner whose UV differs from the extrapolated one by this many steps lies beyond a seam
 
 
 def fan(vertices, starts, corners):
-    """((n + m, 3), (c, 3), (c,)): vertices and faces' centres, triangles, each corner's face."""
+    """((n + m, 3) vertices and face centers, (c, 3) triangles, (c,) face of each corner)."""
     counts = np.diff(np.append(starts, len(corners)))
     face = np.repeat(np.arange(len(starts)), counts)
     centres = np.add.reduceat(vertices[corners], starts) / counts[:, None]
@@ -18,11 +18,11 @@ def fan(vertices, starts, corners):
 
 
 def corner_coordinates(points, places, shares, corners, face, moved, uv):
-    """((c, 2), (c,)): coordinates at corners, and which of them are beyond a seam from their face's centre.
+    """((c, 2) UVs of face corners, (c,) whether a seam separates the corner from its face's center).
 
-    `points` (n + m, 3) of `fan` lie at `places` (n + m,) and `shares` (n + m, 3) on triangles of which
-    `moved` (t, 3, 3) has the corners and `uv` (t, 3, 2) their coordinates. Beyond a seam the map of the
-    face's centre goes on.
+    `points` (n + m, 3) of `fan` lie on triangle `places` (n + m,) at barycentric coordinates `shares`
+    (n + m, 3); `moved` (t, 3, 3) are the triangles' corners, `uv` (t, 3, 2) their UVs. Beyond a seam, the UV
+    map at the face's center is extrapolated.
     """
     at = (shares[:, :, None] * uv[places]).sum(axis=1)
     centre = len(points) - (face.max() + 1) + face

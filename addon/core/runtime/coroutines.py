@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-SLICE = 0.02  # seconds that the main thread works at once
+SLICE = 0.02  # seconds of work on the main thread between redraws
 
 
 class Pause(Enum):
@@ -18,13 +18,13 @@ class Pause(Enum):
 
 @dataclass(frozen=True)
 class Finished:
-    """A coroutine has ended, with this result."""
+    """The result of a coroutine that has ended."""
 
     value: Any
 
 
 def step_for(coroutine, seconds=SLICE):
-    """Runs a coroutine until it waits for a worker or the time is over; `Finished` at its end, else None."""
+    """Runs a coroutine until it waits for a worker or time is up; returns Finished at its end, else None."""
     until = time.monotonic() + seconds
     try:
         while next(coroutine) is Pause.REDRAW and time.monotonic() < until:
@@ -35,7 +35,7 @@ def step_for(coroutine, seconds=SLICE):
 
 
 def run_to_completion(coroutine, wait=lambda: time.sleep(0.002)):
-    """Runs a coroutine to its end and returns its result; `wait()` is called where it waits for a worker."""
+    """Runs a coroutine to its end and returns its result; calls `wait()` while it waits for a worker."""
     while True:
         try:
             if next(coroutine) is Pause.WORKER:

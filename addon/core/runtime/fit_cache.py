@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fitted surfaces on disk, found again by the mesh's content and the options of the fit."""
+"""Cache of fitted surfaces on disk, keyed by a hash of the mesh and the fit's options."""
 
 import hashlib
 import json
@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 SUFFIX = ".safetensors"
-IRRELEVANT = {"threads", "device"}  # options that do not change what a fit is
+IRRELEVANT = {"threads", "device"}  # options that do not affect the result
 
 
 def fit_key(vertices, triangles, options, version):
-    """A name for the fit of these (n, 3) vertices and (m, 3) triangles with these options (a dict)."""
+    """Key of the fit of these (n, 3) vertices and (m, 3) triangles with these options (a dict)."""
     digest = hashlib.blake2b(digest_size=16)
     kept = {name: value for name, value in options.items() if name not in IRRELEVANT}
     digest.update(json.dumps([version, sorted(kept.items())]).encode())
@@ -24,7 +24,7 @@ def fit_key(vertices, triangles, options, version):
 
 
 class FitCache:
-    """A folder of fits, named by their keys."""
+    """A folder of fits; file names are keys."""
 
     def __init__(self, folder):
         self.folder = Path(folder)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long work on one worker thread: progress, cancel, an outcome for each item."""
+"""Jobs: long work on a worker thread, with progress, cancellation, and an outcome per item."""
 
 import threading
 import time
@@ -15,11 +15,12 @@ from .threads import start_thread
 
 @dataclass
 class Item:
-    """One object's work: `work(tracker)` runs on the worker, `apply` takes its value on the main thread.
+    """One object's work: `work(tracker)` runs on the worker, `apply` receives its value on the main thread.
+
 
     `apply` returns the line to report, or is a coroutine (runtime/coroutines.py) that does.
-    `preview`, if any, has `show(points)`, `clear()`, and shows the tracker's preview points.
-    `edits` are references to the objects whose mesh `apply` writes.
+    `preview`, if any, has `show(points)` and `clear()`, and displays the tracker's preview points.
+    `edits`: references to the objects whose mesh `apply` writes.
     """
 
     label: str
@@ -59,20 +60,20 @@ class Job:
         self._thread = None
 
     def start(self, items=None):
-        """Starts the worker, on these items where they are known only now."""
+        """Starts the worker, with these items if they were not known before."""
         if items is not None:
             self.items = list(items)
         self._main_thread, self._begin = None, time.monotonic()
         self._thread = start_thread(self.title, self._run, self._low_priority)
 
     def report_main_thread(self, fraction, message):
-        """Progress of what the main thread does before the worker starts or after it has ended."""
+        """Sets the progress of work on the main thread, before the worker starts or after it has ended."""
         if self._cancelled:
             raise JobCancelled
         self._main_thread = fraction, message
 
     def preview_points(self):
-        """(item at work, how often it published preview points, where they are), or (None, 0, None)."""
+        """(current item, number of published previews, their points), or (None, 0, None)."""
         with self._lock:
             if self._current >= len(self.items):
                 return None, 0, None
@@ -126,7 +127,7 @@ class Job:
 
     @property
     def remaining(self):
-        """Seconds left by the pace so far; None while there is too little to go by."""
+        """Estimated seconds left, by the progress so far; None below 2 %."""
         fraction = self.fraction
         return None if fraction < 0.02 else self.elapsed * (1 - fraction) / fraction
 
@@ -174,13 +175,13 @@ def run_item(item, tracker):
 
 
 class Board:
-    """The one job that runs, and the messages of the last one; the panel shows both."""
+    """The running job, if any, and the messages of the last one; the panel shows both."""
 
     def __init__(self):
         self.job, self.messages = None, []
 
     def clear(self):
-        """Cancels the running job and waits for its worker; nothing of it is applied."""
+        """Cancels the running job and waits for its worker; applies no outcomes."""
         if self.job is not None:
             self.job.cancel()
             self.job.join()
@@ -191,7 +192,7 @@ board = Board()
 
 
 def begin(job, start=True):
-    """Makes a job the one that runs; without `start` the main thread prepares it first."""
+    """Makes a job the running one; without `start`, the main thread prepares it first."""
     board.messages.clear()
     board.job = job
     if start:
@@ -207,13 +208,13 @@ def running():
 
 
 def progress():
-    """(fraction done, what is being done) of the running job."""
+    """(fraction done, message) of the running job."""
     job = board.job
     return (job.fraction, job.message) if job is not None else (0.0, "")
 
 
 def add_message(level, text):
-    """Keeps a line for the panel: INFO, WARNING or ERROR."""
+    """Adds a line to the panel's messages, of level INFO, WARNING or ERROR."""
     board.messages.append((level, text))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A worker thread for requests that change faster than they are answered: only the newest one counts."""
+"""A worker thread for requests that change faster than they are solved: only the newest one counts."""
 
 import threading
 
@@ -9,7 +9,7 @@ REST = 0.4  # seconds without a new request after which the result is refined
 
 
 class CancellationToken:
-    """Tells a refinement that a newer request has come; cancels the native tasks that it runs."""
+    """Cancelled by a newer request during a refinement; also cancels the refinement's native tasks."""
 
     def __init__(self):
         self._lock = threading.Lock()
@@ -35,10 +35,10 @@ class CancellationToken:
 
 
 class LatestRequestWorker:
-    """Runs `prepare()` once, then `solve(request)` for the newest request, skipping those between.
+    """Runs `prepare()` once, then `solve(request)` for the newest request; skips those in between.
 
-    `solve` yields better and better results; it is left where a newer request has come.
-    After `rest` seconds without a new request, or at once where `hurry` was called or that is waited for,
+    `solve` yields better and better results; a newer request ends it.
+    After `rest` seconds without a new request, or at once after `hurry` or `wait(refined=True)`,
     `refine(request, token)` yields better and better results until the token is cancelled.
     `poll` returns the newest result, or the error.
     """
@@ -48,8 +48,8 @@ class LatestRequestWorker:
         self._changed = threading.Condition()
         self._request = self._result = self._error = self._token = None
         self._working, self._ended, self._refined = prepare is not None, False, True
-        self._answers = False  # whether there was a result of the newest request
-        self._hurried = False  # whether the newest request is refined without a rest
+        self._answers = False  # whether the newest request has a result
+        self._hurried = False  # whether to refine the newest request without a pause
         self._thread = start_thread("live", self._run, low_priority)
 
     def request(self, request):
@@ -59,7 +59,7 @@ class LatestRequestWorker:
             self._wake()
 
     def hurry(self):
-        """Has the newest request refined at once."""
+        """Starts the refinement of the newest request at once."""
         with self._changed:
             self._hurried = True
             self._changed.notify_all()
@@ -72,7 +72,7 @@ class LatestRequestWorker:
             return newest
 
     def wait_for_result(self, timeout):
-        """Until the newest request has a result or nothing is left to do, so many seconds at most."""
+        """Waits until the newest request has a result or nothing is left to do, at most `timeout` seconds."""
         with self._changed:
             self._changed.wait_for(lambda: self._answers or self._error or self._is_idle(), timeout)
 
@@ -80,7 +80,7 @@ class LatestRequestWorker:
         return self._request is None and not self._working
 
     def wait(self, timeout, refined=False):
-        """Waits until the newest request is solved (and `refined`); False when that takes longer."""
+        """Waits until the newest request is solved (and `refined`); False after `timeout` seconds."""
 
         def reached():
             return self._is_idle() and (self._refined or not refined or self._refine is None)
@@ -132,7 +132,7 @@ class LatestRequestWorker:
                 self._attempt(lambda request=request: self._follow(request))
 
     def _follow(self, request):
-        """Publishes one result after another, until a newer request comes."""
+        """Publishes the results of `solve` until a newer request comes."""
         for result in self._solve(request):
             with self._changed:
                 self._result, self._answers = result, self._request is None

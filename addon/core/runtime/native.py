@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The native library, or the reason why it cannot be used. Nothing here raises on import."""
+"""Loading of the native library, and the reason if it cannot be used. Importing this module never raises."""
 
 import contextlib
 import ctypes
@@ -17,7 +17,7 @@ ADVICE = "Install arapfields-<version>-<platform>.zip of a release, not the sour
 
 
 def library():
-    """The package `arapfields`; UserError when it cannot be used."""
+    """The package `arapfields`; raises UserError if it cannot be used."""
     if is_loading():
         _state.thread.join()
     reason = problem()
@@ -30,7 +30,7 @@ UNKNOWN = object()
 
 
 class _State:
-    """What is known of the library: why it cannot be used, and the thread that loads it."""
+    """State of loading: the problem, if any, and the thread that loads the library."""
 
     problem, thread = UNKNOWN, None
 
@@ -39,7 +39,7 @@ _state = _State()
 
 
 def preload():
-    """Loads the library on a thread: its file first, without Python's lock, then the module."""
+    """Loads the library on a thread: first its file, without the GIL, then the module."""
     if _state.problem is UNKNOWN and _state.thread is None:
         _state.thread = start_thread("loading", _load)
 
@@ -51,12 +51,12 @@ def is_loading():
 def _load():
     with contextlib.suppress(Exception):
         for path in sorted(_folder().glob("libarapfields.*")):
-            ctypes.CDLL(str(path))  # waits for the disk while other threads run
+            ctypes.CDLL(str(path))  # reads the disk while other threads run
     _state.problem = _try_import()
 
 
 def problem():
-    """Why the native library cannot be used, as a UserError; None when it can."""
+    """UserError that says why the native library cannot be used; else None."""
     if is_loading():
         return UserError("The native library is being loaded; wait a moment")
     if _state.problem is UNKNOWN:
@@ -65,7 +65,7 @@ def problem():
 
 
 def forget():
-    """Lets the next call of `problem` try again."""
+    """Resets the state, so that the next call of `problem` tries again."""
     _state.problem, _state.thread = UNKNOWN, None
 
 
@@ -83,7 +83,7 @@ def _try_import():
 
 def _missing(error):
     served = sorted(path.stem.split("-")[2:] for path in WHEELS.glob("arapfields-*.whl"))
-    if error.name == "arapfields" and served:  # Blender unpacks those for its Python and system alone
+    if error.name == "arapfields" and served:  # Blender installs wheels for its Python and system only
         here = f"{sys.version_info.major}.{sys.version_info.minor}, {platform.system()} {platform.machine()}"
         pythons = [python for tags, *_ in served for python in tags.split(".")]
         which = ", ".join([*(f"{python[2]}.{python[3:]}" for python in pythons), served[0][-1]])
@@ -103,7 +103,7 @@ def _folder():
 
 
 def report():
-    """Lines about the library and the machine, for the preferences and for bug reports."""
+    """Lines that describe the library and the machine, for the preferences and for bug reports."""
     lines = [f"Python {platform.python_version()}, {platform.system()} {platform.machine()}"]
     if problem():
         return [*lines, str(problem())]

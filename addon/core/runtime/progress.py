@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Progress of one piece of work through several native calls."""
+"""Progress of an item that makes several native calls."""
 
 import threading
 
@@ -9,7 +9,7 @@ class JobCancelled(Exception):
 
 
 class ProgressTracker:
-    """Progress of one item through several native calls, each with a native task of its own."""
+    """Progress of one item that makes several native calls, each with its own native Task."""
 
     def __init__(self, make_task):
         self._make_task = make_task
@@ -18,13 +18,13 @@ class ProgressTracker:
         self._name = ""
         self._begun = self._weight = 0.0
         self._cancelled = False
-        self.warnings = []  # UserErrors that do not spoil the result, for the user to read
-        self.rest_preview_points = None  # (n, 3) whose moved positions every native call publishes
+        self.warnings = []  # UserErrors to report although there is a result
+        self.rest_preview_points = None  # (n, 3) points whose moved positions native calls publish
 
     def start(self, name, weight):
-        """A task for the next native call, which is about this part, `weight`, of the work that is left.
+        """A Task for the next native call, which takes the share `weight` of the remaining work.
 
-        The last call has weight 1, so that the whole ends at 1 whatever was skipped before it.
+        The last call has weight 1, so that progress ends at 1 even if earlier calls were skipped.
         """
         with self._lock:
             self._begun = min(1.0, self._begun + self._weight)
@@ -43,7 +43,7 @@ class ProgressTracker:
                 self._task.cancel()
 
     def preview_points(self):
-        """(how often the preview points were published, where they are) in the present native call."""
+        """(number of published previews, their points) of the current native call."""
         with self._lock:
             task = self._task
         count = task.looks if task is not None and self.rest_preview_points is not None else 0

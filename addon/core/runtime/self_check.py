@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small problems with known answers: whether the library works on this machine, in seconds."""
+"""Self-check: solves small problems with known results on this machine, in seconds."""
 
 import tempfile
 import time
@@ -17,9 +17,9 @@ SIDES = np.array(
     ]
 )
 LIFT = np.array([0.0, 0.0, 0.5])
-CLOSE = 1e-5  # single precision, on lengths of order one
-FOLLOWED = 0.05  # soft handles are followed nearly
-CELL = 0.1  # of the grid on which the cube's surface is found
+CLOSE = 1e-5  # tolerance of single precision, for lengths around 1
+FOLLOWED = 0.05  # tolerance for soft handles
+CELL = 0.1  # cell size of the grid on which the cube's surface is extracted
 
 
 def distances(af):
@@ -33,7 +33,7 @@ def surface(af):
 
 
 def network(af):
-    """A fit, written to a file and read again: libtorch, its threads and our files."""
+    """A fit, saved and loaded: tests libtorch, its threads and the file format."""
     sdf = af.fit_sdf(CUBE, SIDES, af.FitOptions(width=16, iterations=20, time_budget=5.0))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cube ü.safetensors"
@@ -69,7 +69,7 @@ def live(af):
 
 
 def refusal(af):
-    """An error that the library throws arrives as a Python exception that says what is wrong."""
+    """A C++ exception of the library arrives as a Python exception with a message."""
     try:
         af.signed_distance(CUBE, SIDES + 100, CUBE)
     except af.InvalidInput as error:
@@ -107,7 +107,7 @@ def expect(result, expected, tolerance):
 
 
 def run(checks=CHECKS):
-    """(lines of one report, whether everything works)."""
+    """(lines of the report, whether all checks pass)."""
     lines, works = native.report(), native.problem() is None
     if not works:
         return lines, False
@@ -116,7 +116,7 @@ def run(checks=CHECKS):
         begun, problem = time.perf_counter(), ""
         try:
             check(library)
-        except Exception as error:  # whatever it is, the others are of interest too
+        except Exception as error:  # run the other checks after any error
             problem = f"{type(error).__name__}: {error}"
         seconds = time.perf_counter() - begun
         lines.append(f"{name}: {problem or 'right'} ({seconds:.1f} s)")

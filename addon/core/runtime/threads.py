@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one way to start a thread, and the priority of threads that work beside a window."""
+"""Starting of threads, with low priority beside a window."""
 
 import contextlib
 import os
 import sys
 import threading
 
-NICENESS = 10  # steps of priority below the window's
+NICENESS = 10  # added to the nice value of low-priority threads
 PREFIX = "arapfields "  # of the threads' names
 
 
 def start_thread(name, work, low_priority=False):
-    """Starts `work()` on a thread that does not keep the process alive; returns the thread."""
+    """Starts `work()` on a daemon thread; returns the thread."""
 
     def run():
         if low_priority:
@@ -29,9 +29,9 @@ def own_threads():
 
 
 def lower_thread_priority():
-    """Lowers the priority of the calling thread, and of each that it starts from now on, below the window's.
+    """Lowers the priority of the calling thread, and of threads that it starts later, below the window's.
 
-    On Linux alone: elsewhere such a priority belongs to the whole process.
+    On Linux only: on other systems the nice value belongs to the whole process.
     """
     if sys.platform == "linux":
         with contextlib.suppress(OSError):

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of what can be set, and the choices; no bpy."""
+"""Tables of parameters and enum items; no bpy."""

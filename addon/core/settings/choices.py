@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Choices that are no option of the solvers: (identifier, label, tip) each, as Blender's menus show them."""
+"""Enum items for settings that are no solver options: (identifier, label, tip)."""
 
 EMPTY_KINDS = (  # of handles that Empties move
     ("CUBE", "Region", "What lies in the box at rest follows the Empty"),
@@ -21,7 +21,7 @@ BONES = (  # of an armature, as handles
     ("SELECTED", "Selected", "The selected bones"),
     ("DEFORMING", "Deforming", "All bones that deform and, where the mesh has groups of bones, have one"),
 )
-CARRYING = (  # ways in which the field moves other objects
+CARRYING = (  # carriers of other objects
     ("FOLLOW", "Follow", "Bends with the body: clothes, hair, lattices"),
     ("RIGID", "Rigid", "Moves and turns as a whole: eyes, buttons, glasses"),
     ("TOGETHER", "Together", "Bends with the body and resists as the body does: sleeves, armour"),
@@ -72,7 +72,7 @@ PLACEMENTS = (  # of a result
     ("REPLACE", "Replace Mesh", "The source itself moves; its handles' poses become their rest poses"),
     ("KEY", "Shape Key", "One more shape key of the source, which can be blended and animated"),
 )
-PLACEMENT_NUMBERS = {"NEW": 0, "REPLACE": 1, "KEY": 2, "MODIFIER": 3}  # as files store them
+PLACEMENT_NUMBERS = {"NEW": 0, "REPLACE": 1, "KEY": 2, "MODIFIER": 3}  # enum values in .blend files
 ORIENTATIONS = (  # of a style
     ("UPRIGHT", "World Upright", "The style stands upright in the world and heads where the object does"),
     ("OBJECT", "Object", "The style stands along the object's own axes"),
@@ -117,7 +117,7 @@ LIVE_KINDS = (
     ("STYLIZE", "Stylize", "The shape follows the style's settings, and its handles where the style does"),
 )
 
-# What goes from a wrapped object to its target.
+# Kinds of data transferred from a wrapped object to its target.
 TRANSFERRED = (
     ("KEYS", "Shape Keys", "Each key of the object, turned and scaled as the wrap does, with its drivers"),
     ("GROUPS", "Vertex Groups", "Weights and groups; locked groups of the target stay"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings that artists see, from the table of the native options (native/options/options.toml)."""
+"""The parameters of the panels, from the table of native options (native/options/options.toml)."""
 
 import importlib.util
 import json
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
-LARGEST = 2**31 - 1  # that Blender's integers hold
+LARGEST = 2**31 - 1  # largest integer of a Blender property
 
 
 @dataclass(frozen=True)
@@ -22,16 +22,16 @@ class Parameter:
     high: float | None = None
     soft_low: float | None = None
     soft_high: float | None = None
-    items: tuple = ()  # (identifier, label, tip) of a choice
+    items: tuple = ()  # enum items (identifier, label, tip)
     advanced: bool = False
-    plain: str = ""  # the tip without what 0 stands for
-    zero: tuple = ()  # (label of a switch, what 0 stands for, value instead)
-    methods: tuple = ()  # the fields on which it acts; none: all
-    needs: str = ""  # the switch without which it does nothing
+    plain: str = ""  # the tip without the meaning of 0
+    zero: tuple = ()  # (label of the switch, meaning of 0, value if switched off)
+    methods: tuple = ()  # fields that use it; none: all
+    needs: str = ""  # name of the switch that enables it
 
     @property
     def switch(self):
-        """Name of the switch in the place of 0."""
+        """Name of the switch that stands for 0."""
         return f"{self.name}_is_zero"
 
     @property
@@ -41,10 +41,10 @@ class Parameter:
 
 
 def read_table():
-    """Name → operation: the snapshot that ships with the extension, else the table of the clone.
+    """{name: operation}: the snapshot that ships with the extension, else the clone's table.
 
-    Empty where neither is at hand, in an installation of the source code alone: there is then nothing to set,
-    and core/runtime/native.py says what to install.
+    Empty without either, if only the source code is installed; core/runtime/native.py then says what to
+    install.
     """
     path = Path(__file__).resolve()
     shipped = path.with_name("options.json")
@@ -63,7 +63,7 @@ TABLE = read_table()
 
 
 def parameter(option, advanced=False):
-    """An option of the table as a setting."""
+    """An option of the table as a Parameter."""
     choices = option["choices"].items()
     return Parameter(
         option["name"],
@@ -84,7 +84,7 @@ def parameter(option, advanced=False):
 
 
 def parameters(operation):
-    """What the panel shows of an operation, in order; of a group without a panel, everything."""
+    """The Parameters of an operation's panel, in order; without a panel in the table, all."""
     block = TABLE.get(operation)
     if block is None:
         return []
@@ -96,7 +96,7 @@ def parameters(operation):
 
 
 def method_of(group, parameters):
-    """The field that an operation's settings ask for; Automatic is neural where a network's option is set."""
+    """The field type of an operation's settings; "auto" is neural if an option of networks is changed."""
     field = getattr(group, "field", "neural")
     if field != "auto":
         return field
@@ -105,25 +105,25 @@ def method_of(group, parameters):
 
 
 def is_fast(values, parameters):
-    """Whether an operation with these values solves by radial functions, with handles that pull."""
+    """Whether an operation with these values uses radial basis functions and soft handles."""
     return method_of(SimpleNamespace(**values), parameters) == "radial" and not values.get("exact_handles")
 
 
 def counts(parameter, group, method):
-    """Whether a setting does anything beside the others."""
+    """Whether a setting has an effect, given the others."""
     is_on = not parameter.needs or getattr(group, parameter.needs)
     return is_on and (not parameter.methods or method in parameter.methods)
 
 
 def presets(operation):
-    """Identifier → label, tip, what it sets."""
+    """{identifier: (label, tip, values)} of an operation's presets."""
     given = TABLE.get(operation, {}).get("presets", {})
     return {key.upper(): (p["label"], p["sentence"], p["values"]) for key, p in given.items()}
 
 
 OPERATIONS = ("fit", "deform", "wrap", "skin", "extraction", "machine")
 FIT, DEFORM, WRAP, SKIN, EXTRACTION, MACHINE = map(parameters, OPERATIONS)
-QUALITIES = presets("fit")  # identifier → label, tip, what it sets
+QUALITIES = presets("fit")  # {identifier: (label, tip, values)}
 
 
 def native_options(operation, values):

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the stylization, and the styles there are."""
+"""Settings of the stylization, and the list of styles."""
 
 from .parameters import parameters
 
 STYLIZE = parameters("stylize")
 
-STYLES = [  # as the native library names them, and how the menu does
+STYLES = [  # (native name, label in the menu)
     ("cube", "Cube"),
     ("tetrahedron", "Tetrahedron"),
     ("octahedron", "Octahedron"),
@@ -22,9 +22,9 @@ STYLES = [  # as the native library names them, and how the menu does
     ("plane pair", "Flat Top and Bottom"),
 ]
 
-CUSTOM = {  # styles whose normals an object of the scene gives: identifier → label, tip
+CUSTOM = {  # styles by an object of the scene: {identifier: (label, tip)}
     "AXES": ("Axes of an Object", "Turns the surface along the axes of an object of your choice"),
-    # Last, as Faces of a Mesh was: Blender's files hold its number.
+    # Last, as Faces of a Mesh was: .blend files store its index.
     "OBJECT": ("Object", "Turns the surface towards what a mesh object of your choice has in each direction"),
 }
 
