@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a source does not pass: obstacles and the ground."""
+"""Contact of a source with obstacles, the ground and itself."""

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is put on a source's list of obstacles."""
+"""Adds entries to a source's list of obstacles."""
 
 from ..blender.object_references import settings_of
 
 
 def add(source, item, margin=0.0):
-    """Puts an object, or an empty row, on a source's list; returns the entry."""
+    """Adds an object, or an empty row, to a source's list; returns the entry."""
     group = settings_of(source).contact
     entry = group.obstacle_list.add()
     group.active_obstacle = len(group.obstacle_list) - 1

@@ -11,7 +11,7 @@ from .obstacles import add
 
 
 class ObstacleOperator(SourceOperator):
-    """Mixin: works on the list of what is in the way of the panel's source."""
+    """Mixin: works on the list of obstacles of the panel's source."""
 
     bl_options = {"REGISTER", "UNDO"}
     guide = "motion"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""object.arapfields.contact: what the surface does not pass."""
+"""object.arapfields.contact: obstacles, ground and self-contact."""
 
 import bpy
 
@@ -7,7 +7,7 @@ from ..blender.property_definitions import collection, flag, integer, number, po
 
 
 class ARAPFIELDS_PG_obstacle(bpy.types.PropertyGroup):
-    # `name`, which every entry has, is the object's when it was added: it tells what was deleted
+    # `name`, which every PropertyGroup has, keeps the object's name for messages after its deletion
     item: pointer(
         bpy.types.Object,
         "Object",

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The modifier on the source itself that carries its motion."""
+"""The Geometry Nodes modifier that holds a source's motion, its layers, masks and cache."""

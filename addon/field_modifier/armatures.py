@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Armature modifiers whose bones are handles: the field poses in their place, so they are off meanwhile."""
+"""Disables Armature modifiers whose bones are handles, while the field poses instead."""
 
 import json
 
@@ -8,7 +8,7 @@ from ..blender.object_references import settings_of
 
 
 def silence(source):
-    """Switches them off, and notes how they were; those that the field replaces no more are on again."""
+    """Disables them and stores their visibility; restores those that the field no longer replaces."""
     rigs = modifier_stack.handle_rigs(source)
     noted = read(source)
     for modifier in source.modifiers:
@@ -22,7 +22,7 @@ def silence(source):
 
 
 def restore(source):
-    """Has all of them as they were."""
+    """Restores the visibility of all of them."""
     noted = read(source)
     for modifier in source.modifiers:
         if key_in(noted, modifier) is not None:
@@ -31,7 +31,7 @@ def restore(source):
 
 
 def key_in(noted, modifier):
-    """By what a modifier is noted: its number, or its name in files of earlier versions; or None."""
+    """Key of a stored modifier: its persistent_uid, or in files of earlier versions its name; or None."""
     keys = str(modifier.persistent_uid), modifier.name
     return next((key for key in keys if key in noted), None)
 
@@ -43,5 +43,5 @@ def read(source):
 
 def write(source, noted):
     text = json.dumps(noted) if noted else ""
-    if settings_of(source).silenced != text:  # a write counts as a change of the object
+    if settings_of(source).silenced != text:  # any write tags the object as updated
         settings_of(source).silenced = text

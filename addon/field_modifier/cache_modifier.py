@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The modifier that plays a bake: Blender's own Mesh Cache, where the field's modifier stands in the stack.
+"""The Mesh Cache modifier that plays a bake, at the field modifier's place in the stack.
 
-While it plays, the field's modifier is off; what gives the object a new motion puts it back.
+While it plays, the field's modifier is disabled; a new motion of the object enables it again.
 """
 
 import bpy
@@ -14,10 +14,10 @@ from . import inputs, masks
 
 
 def play(source, path, start, step):
-    """Has the object play a cache (PC2 or MDD by its suffix) of which sample i is frame start + i · step.
+    """Plays a cache (PC2 or MDD by its suffix) on the object; sample i is frame start + i · step.
 
-    The modifier that there is already keeps its place, its name and what the user set. `path` may be relative
-    to the .blend. Returns the modifier.
+    An existing modifier keeps its place, its name and the user's settings. `path` may be relative to the
+    .blend. Returns the modifier.
     """
     modifier = modifier_stack.find_cache(source)
     if modifier is None:
@@ -31,7 +31,7 @@ def play(source, path, start, step):
 
 
 def add(source):
-    """A new one, with the field's own fading and vertex group, if any."""
+    """Adds the modifier, with the field modifier's Factor and vertex group, if any."""
     field, index = modifier_stack.find(source), modifier_stack.place(source)
     modifier = source.modifiers.new(CACHE_MODIFIER, "MESH_CACHE")
     settings_of(source).bake.uid = modifier.persistent_uid
@@ -45,20 +45,20 @@ def add(source):
 
 
 def is_playing(source):
-    """Whether the object's shape is the bake's."""
+    """Whether the object shows its bake."""
     modifier = modifier_stack.find_cache(source)
     return modifier is not None and modifier.show_viewport
 
 
 def set_playing(source, on):
-    """Shows the bake instead of the field, or the other way round."""
+    """Shows the bake's modifier and hides the field's, or the reverse."""
     for modifier, shown in ((modifier_stack.find_cache(source), on), (modifier_stack.find(source), not on)):
         if modifier is not None:
             modifier.show_viewport = modifier.show_render = shown
 
 
 def suspend(source):
-    """The field's motion is about to change: it is shown, rather than the bake. Whether the bake was."""
+    """Shows the field instead of the bake, before its motion changes; returns whether the bake was shown."""
     playing = is_playing(source)
     if playing:
         set_playing(source, False)
@@ -69,7 +69,7 @@ MEMBERS = ("cache_format", "filepath", "frame_scale", "frame_start", "show_viewp
 
 
 def snapshot(source):
-    """What restore() needs to have the object show what it does now."""
+    """The state of both modifiers, for restore()."""
     cache, field = modifier_stack.find_cache(source), modifier_stack.find(source)
     return (
         None if cache is None else [getattr(cache, name) for name in MEMBERS],
@@ -91,7 +91,7 @@ def restore(source, shown):
 
 
 def remove(source):
-    """Takes the modifier away, and shows the field again; the file stays."""
+    """Removes the modifier and shows the field again; the cache file stays."""
     set_playing(source, False)
     modifier = modifier_stack.find_cache(source)
     if modifier is not None:

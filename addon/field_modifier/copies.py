@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A second copy of the field's modifier in one stack would double the motion: it is switched off."""
+"""Disables duplicates of the field's modifier in one stack, which would double the motion."""
 
 from ..blender import modifier_stack
 from ..blender.language import translated
@@ -7,7 +7,7 @@ from ..core.runtime import jobs
 
 
 def switch_off(source):
-    """Switches off all but the first field modifier of an object."""
+    """Disables all but the first field modifier of an object."""
     for modifier in [m for m in source.modifiers if modifier_stack.is_field(m)][1:]:
         if modifier.show_viewport or modifier.show_render:
             modifier.show_viewport = modifier.show_render = False

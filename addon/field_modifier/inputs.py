@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Inputs of a Geometry Nodes modifier by name, in each Blender's own way."""
+"""Inputs of a Geometry Nodes modifier by name, in all supported versions of Blender."""
 
 
 def identifier(modifier, name):
@@ -8,7 +8,7 @@ def identifier(modifier, name):
 
 
 def slot(modifier, name):
-    """Blender 5.2's property group of an input; None in versions whose modifiers hold inputs as items."""
+    """Blender 5.2's property group of an input; None in versions that store inputs as ID properties."""
     inputs = getattr(getattr(modifier, "properties", None), "inputs", None)
     return None if inputs is None else getattr(inputs, identifier(modifier, name))
 
@@ -28,7 +28,7 @@ def put(modifier, name, value):
 
 
 def get_attribute(modifier, name):
-    """Name of the attribute or vertex group that an input takes; "" where it is a plain value."""
+    """Name of the attribute or vertex group that an input reads; "" if it is a single value."""
     socket = slot(modifier, name)
     if socket is not None:
         return socket.attribute_name if socket.type == "ATTRIBUTE" else ""
@@ -37,7 +37,7 @@ def get_attribute(modifier, name):
 
 
 def put_attribute(modifier, name, attribute):
-    """Has an input take an attribute or vertex group, or with "" its plain value."""
+    """Sets an input to an attribute or vertex group, or with "" to its single value."""
     socket = slot(modifier, name)
     if socket is not None:
         socket.type = "ATTRIBUTE" if attribute else "VALUE"
@@ -50,7 +50,7 @@ def put_attribute(modifier, name, attribute):
 
 
 def objects(modifier):
-    """What its inputs for objects name."""
+    """The values of its object inputs."""
     sockets = [
         one for one in modifier.node_group.interface.items_tree if getattr(one, "in_out", "") == "INPUT"
     ]

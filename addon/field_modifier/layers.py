@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Results that stay below: a style acts on what a wrap has made of an object, a deformation on both.
+"""Layers: earlier results that later ones act on, a style on a wrap, a deformation on both.
 
-A layer is a modifier of ours that the field has left. It keeps its place, its fading and, under names of its
-own, its motion. Where the field's modifier goes, the last layer becomes it again.
+A layer is a former field modifier. It keeps its place, its Factor and its motion, in attributes of its own.
+When the field's modifier is removed, the last layer becomes the field's modifier again.
 """
 
 import contextlib
@@ -15,17 +15,17 @@ from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, LAYER_GROUP
 from . import cache_modifier, inputs, motion, node_group
 
-ORDER = {"WRAP": 0, "STYLIZE": 1, "DEFORM": 2}  # each acts on what those before it have made
-STAYING = {"WRAP": "Wrap", "STYLIZE": "Stylize"}  # kinds that stay below others, and what they are called
-POSED = "POSED"  # kind of a style that holds its handles: a pose over it would move them twice
+ORDER = {"WRAP": 0, "STYLIZE": 1, "DEFORM": 2}  # each acts on the results of lower ones
+STAYING = {"WRAP": "Wrap", "STYLIZE": "Stylize"}  # {kind that can become a layer: its label}
+POSED = "POSED"  # kind of a style with handles: a deformation on it would move them twice
 
 
 def note(source, kind):
-    """Notes what a source's field follows: its kind, POSED for a style with handles, or ""."""
+    """Stores the kind of a source's motion: POSED for a style with handles, or ""."""
     settings = settings_of(source)
     if kind == "STYLIZE" and settings.stylize.use_handles and settings.handles:
         kind = POSED
-    if settings.moved_by != kind:  # a write counts as a change of the object
+    if settings.moved_by != kind:  # any write tags the object as updated
         settings.moved_by = kind
 
 
@@ -39,19 +39,19 @@ def can_stay(source):
 
 
 def stays_below(source, kind):
-    """Whether a run of that kind acts on what the field has made."""
+    """Whether a run of that kind acts on the field's present result."""
     return can_stay(source) and ORDER[settings_of(source).moved_by] < ORDER[kind]
 
 
 def below_pose(source, in_place):
-    """The modifiers that make the shape on which a deformation acts."""
+    """The modifiers that make the shape that a deformation acts on."""
     field = [modifier_stack.find(source)] if in_place and stays_below(source, "DEFORM") else []
     return [*modifier_stack.before(source, in_place), *field]
 
 
 def replaced(source, kind):
-    """The UserError that says which result a run of that kind replaces; None where it is one of its own kind,
-    or stays."""
+    """UserError that says which result a run of that kind replaces; None if that is of the same kind, or
+    becomes a layer."""
     by = settings_of(source).moved_by.replace(POSED, "STYLIZE")
     if modifier_stack.find(source) is None or by in ("", kind) or stays_below(source, kind):
         return None
@@ -60,8 +60,8 @@ def replaced(source, kind):
 
 
 def make_way(source, kind):
-    """Before the shape is read on which a run of that kind acts: what it acts on becomes a layer; what lies
-    over that goes. Returns the latter, for `put_back` where nothing comes of the run."""
+    """Called before a run reads its shape: makes the result that it acts on a layer, and removes those above.
+    Returns the removed ones for `put_back`, if the run fails."""
     gone = []
     if stays_below(source, kind):
         cover(source)
@@ -74,20 +74,20 @@ def make_way(source, kind):
 
 
 def make_way_for_handle(source):
-    """Before a handle is made: it holds the shape that is seen. A live style goes on until a pose begins."""
+    """make_way() before a handle is made, which holds the visible shape; not while a session is live."""
     if not settings_of(source).live_kind:
         make_way(source, "DEFORM")
 
 
 def put_back(context, source, gone):
-    """After a run of which nothing came: the layers and the motion over them are as before."""
+    """Restores layers and the motion on top of them after a run that failed."""
     for one in reversed(gone):
         if not can_stay(source):
             break
         cover(source)
         if one is not None:
             moved, by, factor = one
-            with contextlib.suppress(UserError):  # the mesh is another one by now
+            with contextlib.suppress(UserError):  # the mesh has changed
                 inputs.put(motion.bind(context, source), "Factor", factor)
                 motion.write(source, moved)
                 settings_of(source).moved_by = by
@@ -106,7 +106,7 @@ def kind_in(layer):
 
 
 def cover(source):
-    """Makes the field's modifier the last layer."""
+    """Turns the field's modifier into the last layer."""
     settings, field = settings_of(source), modifier_stack.find(source)
     mesh, kind, normals = motion.carrier(source, field), settings.moved_by, node_group.normals_of(field)
     taken = {int(parts(layer)[1]) for layer in modifier_stack.layers(source)}
@@ -121,7 +121,7 @@ def cover(source):
 
 
 def uncover(source):
-    """Makes the last layer the field's modifier, where there is none and no bake plays in its place."""
+    """Turns the last layer into the field's modifier, unless there is one or a bake's modifier."""
     layers = modifier_stack.layers(source)
     owned = modifier_stack.find(source) or modifier_stack.find_cache(source)
     if not layers or owned is not None or source.mode == "EDIT":
@@ -132,7 +132,7 @@ def uncover(source):
     motion.written.add(source.session_uid)
     moved = motion.read_from(mesh, number)
     if mesh == source.data and mesh.users > 1:
-        mesh = mesh.copy()  # others that share it have motions of their own
+        mesh = mesh.copy()  # other users keep their motion
         motion.take_helper(source, layer, mesh)
     motion.write_to(mesh, moved)
     motion.write_to(mesh, motion.Motion(None), number)
@@ -144,13 +144,13 @@ def uncover(source):
 
 
 def rename(modifier, old, new):
-    """A name that the user gave stays."""
+    """Renames a modifier, unless the user has renamed it."""
     if modifier.name == old:
         modifier.name = new
 
 
 def discard(source):
-    """Takes the layers away where what they moved is part of the mesh now."""
+    """Removes the layers once the mesh contains their motion."""
     while modifier_stack.layers(source) and modifier_stack.find(source) is None:
         uncover(source)
         motion.discard(source)

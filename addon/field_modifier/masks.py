@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The vertex group that says how far each point of a source goes of the way: the Mask of its modifiers."""
+"""The Mask of a source's modifiers: a vertex group that scales the motion of each point."""
 
 from ..blender import modifier_stack, property_definitions
 from ..blender.object_references import settings_of
@@ -13,7 +13,7 @@ def group_of(source):
 
 
 def take(source):
-    """Has a new modifier, or one that is used again, take the mask that is chosen in the panel, if any."""
+    """Sets the mask chosen in the panel, if any, on a new or reused modifier."""
     chosen = settings_of(source).stiffness.mask
     if chosen and group_of_field(source) != chosen:
         put(source, chosen)
@@ -25,7 +25,7 @@ def group_of_field(source):
 
 
 def put(source, group):
-    """Gives the field's modifier, and that of a bake, this group, or with "" none."""
+    """Sets this group, or with "" none, on the modifiers of the field and of the bake."""
     field, cache = modifier_stack.find(source), modifier_stack.find_cache(source)
     if field is not None:
         inputs.put_attribute(field, "Mask", group)
@@ -34,14 +34,14 @@ def put(source, group):
 
 
 def lend(source, item):
-    """Has a carried object heed its own weights of the name of the source's mask, where it has such."""
+    """Sets a carried object's own group with the name of the source's mask as its mask, if it has one."""
     group = group_of(source)
     if group:
         put_carried(item, group)
 
 
 def put_carried(item, group):
-    """Gives what carries the motion of a carried object this group, or none; its own choice stays."""
+    """Sets this group, or none, as the mask of a carried object, unless it has a chosen one."""
     if settings_of(item).stiffness.mask:
         return
     group = group if has(item, group) else ""
@@ -56,7 +56,7 @@ def put_carried(item, group):
 
 
 def has(item, group):
-    """Whether an object has weights of that name: a vertex group, or numbers on the points of hair."""
+    """Whether an object has weights of that name: a vertex group, or a float attribute on hair points."""
     if item.type in ("CURVES", "POINTCLOUD"):
         attribute = item.data.attributes.get(group)
         return attribute is not None and (attribute.domain, attribute.data_type) == ("POINT", "FLOAT")
@@ -64,7 +64,7 @@ def has(item, group):
 
 
 def chosen(settings):
-    """The user has chosen another group."""
+    """Update callback of the chosen mask."""
     source = settings.id_data
     put(source, settings.mask)
     for entry in settings_of(source).carried:

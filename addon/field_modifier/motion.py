@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An object's motion: its modifier, and where the offsets lie.
+"""An object's motion: its modifier, and the mesh that stores the offsets.
 
-They lie on the mesh itself; on a helper mesh, in no scene, where modifiers before make the vertices, other
-objects share the mesh, or it is linked.
+Offsets are attributes of the mesh itself, or of a helper mesh in no scene if earlier modifiers make the
+vertices, or if the mesh is linked or shared with other objects.
 """
 
 from dataclasses import dataclass
@@ -18,30 +18,30 @@ from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, TURNS
 from . import armatures, cache_modifier, inputs, masks, node_group
 
-written = set()  # session_uid of objects that were moved since Blender's last update, which is ours alone
+written = set()  # session_uids of objects that the add-on itself has moved since the last depsgraph update
 
 
 @dataclass
 class Motion:
-    """(n, 3) offsets and turns (axis · angle) of the points, in local coordinates; None: there are none."""
+    """(n, 3) offsets and rotation vectors (axis · angle) of the points, in local coordinates; None: none."""
 
     offsets: np.ndarray | None
     turns: np.ndarray | None = None
-    changes: dict | None = None  # {attribute of splats: (n,) or (n, 3) what is added to it}
+    changes: dict | None = None  # {attribute of splats: (n,) or (n, 3) its change}
 
 
 def refusal(source):
-    """Why an object cannot have a field modifier, as a UserError; None where it can."""
+    """UserError that says why an object cannot have a field modifier; else None."""
     if source.library is not None:
         return UserError("{name} is linked from another file; choose New Object for the result", source)
     return None
 
 
 def bind(context, source, expected=None):
-    """Gives the object its modifier and a mesh that carries the offsets, none yet; returns the modifier.
+    """Adds the modifier and the mesh that stores the offsets, without any; returns the modifier.
 
-    Where there is one already, its place and inputs stay, and its motion where the points are as many.
-    UserError where the points are not as many as `expected`.
+    An existing modifier keeps its place and inputs, and its motion if the number of points is the same.
+    UserError if that number is not `expected`.
     """
     modifier, copied = modifier_stack.find(source), None
     with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
@@ -86,12 +86,12 @@ def add(source, normals, splats):
 
 
 def choose_group(modifier, normals, splats):
-    """Exchanges the node group where the normals ask for another."""
+    """Replaces the node group if the domain of the normals has changed."""
     take_group(modifier, node_group.find_or_make(normals, splats))
 
 
 def take_group(modifier, group):
-    """Gives a modifier of ours another node group; what the user set stays."""
+    """Replaces the node group of a field modifier; keeps the user's inputs."""
     if modifier.node_group == group:
         return
     factor, mask = inputs.get(modifier, "Factor"), inputs.get(modifier, "Mask")
@@ -105,15 +105,15 @@ def take_group(modifier, group):
 
 
 def take_helper(source, modifier, mesh):
-    """Has the modifier read its offsets from this mesh."""
+    """Makes the modifier read its offsets from this mesh."""
     own = [one.name for one in mesh.attributes if not (one.is_required or one.is_internal)]
-    for name in own:  # not the attributes themselves: Blender moves those left when one is removed
+    for name in own:  # by name: removing an attribute invalidates the other references
         if name not in (OFFSETS, TURNS):
             mesh.attributes.remove(mesh.attributes[name])
     mesh.materials.clear()
     helper = inputs.get(modifier, "Offsets")
     mesh.name = f"{source.name}{HELPER_SUFFIX}"
-    if helper is None or users_of(helper) > 1 or helper.library is not None:  # a copied object shares it
+    if helper is None or users_of(helper) > 1 or helper.library is not None:  # shared with a duplicate
         inputs.put(modifier, "Offsets", bpy.data.objects.new(mesh.name, mesh))
         return
     old, count = helper.data, len(points_of(mesh))
@@ -132,7 +132,7 @@ def forget_helper(modifier):
 
 
 def users_of(helper):
-    """How many use it; `users` counts too many of what an input of a modifier names, in Blender 5.2."""
+    """Number of users; Blender 5.2 counts too many in `users` for objects in modifier inputs."""
     return len(bpy.data.user_map(subset=[helper])[helper])
 
 
@@ -142,13 +142,13 @@ def discard_helper(helper):
 
 
 def carrier(source, modifier):
-    """The mesh on which the offsets lie."""
+    """The mesh that stores the offsets."""
     helper = inputs.get(modifier, "Offsets")
     return source.data if helper is None else helper.data
 
 
 def write(source, motion):
-    """Moves the object's points; UserError where its modifier is gone or the points are others."""
+    """Writes a Motion to the object; UserError if its modifier is missing or the points have changed."""
     modifier = modifier_stack.find(source)
     if modifier is None:
         raise UserError("The modifier of {name} was removed", source)
@@ -160,7 +160,7 @@ def write(source, motion):
 
 
 def write_to(mesh, motion, number=""):
-    """`number`: of the layer whose motion it is."""
+    """`number`: the layer's, if the motion is that of a layer."""
     for name, vectors in zip(node_group.names_of(number), (motion.offsets, motion.turns), strict=True):
         attribute = mesh.attributes.get(name)
         if vectors is None:
@@ -183,7 +183,7 @@ def read_from(mesh, number=""):
 
 
 def shown_points(source):
-    """(n, 3) the points of an object's own data, with its offsets where the field is on; single precision."""
+    """(n, 3) float32 points of an object's own data, plus its offsets if the field's modifier is on."""
     points = mesh_arrays.vectors(*mesh_arrays.position_vectors(source.data))
     modifier = modifier_stack.find(source)
     offsets = vectors(source.data, OFFSETS) if modifier is not None and modifier.show_viewport else None
@@ -198,13 +198,13 @@ def vectors(mesh, name):
 
 
 def snapshot(source):
-    """The object's motion, to be restored; None where it has no field modifier."""
+    """The object's Motion, for restore(); None without a field modifier."""
     modifier = modifier_stack.find(source)
     return None if modifier is None else read_from(carrier(source, modifier))
 
 
 def restore(source, motion):
-    """Makes the object's motion what a snapshot holds, bit for bit; points that are others do not move."""
+    """Restores a snapshot bit for bit; without offsets if the number of points has changed."""
     modifier = modifier_stack.find(source)
     if motion is None:
         remove(source)
@@ -215,20 +215,20 @@ def restore(source, motion):
 
 
 def remove(source):
-    """Takes the object's modifier away, with all that was made for it; its armature poses it again."""
+    """Removes the modifier with its helper data, and enables the object's Armature modifiers."""
     discard(source)
     armatures.restore(source)
 
 
 def discard(source):
-    """Takes the object's modifier away where what it moved is part of the mesh now."""
+    """Removes the modifier once the mesh contains its motion."""
     modifier = modifier_stack.find(source)
     if modifier is not None:
         helper = inputs.get(modifier, "Offsets")
         remove_node_modifier(modifier)
         if helper is not None:
             discard_helper(helper)
-    if settings_of(source).under_rig:  # a write counts as a change of the object
+    if settings_of(source).under_rig:  # any write tags the object as updated
         settings_of(source).under_rig = False
     if settings_of(source).moved_by:
         settings_of(source).moved_by = ""

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The node group that adds an object's motion to its points; Blender evaluates it without the extension.
 
-The motion is one offset a point, in the object's coordinates: an attribute of the mesh itself, or, where
-modifiers before make the points, an attribute of a helper mesh, taken point by point. Where that has another
-number of points than the mesh at hand (a render at a higher level of subdivision), it is taken from the
-nearest place of the helper's surface instead.
+The motion is one offset per point, in the object's coordinates: an attribute of the mesh itself, or, if
+earlier modifiers make the points, of a helper mesh, read by index. If the helper has another number of points
+than the geometry (a render at a higher subdivision level), the offset is sampled at the nearest point of the
+helper's surface instead.
 """
 
 import bpy
@@ -13,15 +13,15 @@ from ..blender.modifier_stack import FREE_NORMALS
 from ..names import CHANGES, FIELD_GROUP, FIELD_MODIFIER, LAYER_GROUP, OFFSETS, TURNS
 
 VERSION = 1
-VECTORS = {"data_type": "FLOAT_VECTOR", "domain": "POINT"}  # of nodes that sample points
-CHANGE_KINDS = {"QUATERNION": "FLOAT_COLOR"}  # of what is added to an attribute, where it is another
-PLAIN = ""  # of the groups: the one that turns no normals; the others are named by the normals' domain
+VECTORS = {"data_type": "FLOAT_VECTOR", "domain": "POINT"}  # settings of nodes that sample points
+CHANGE_KINDS = {"QUATERNION": "FLOAT_COLOR"}  # {type of an attribute: type of its change}, if other
+PLAIN = ""  # key of the group that rotates no normals; other keys are the normals' domain
 
 
 def find_or_make(normals=PLAIN, splats=None):
     """The group for a mesh whose free custom normals lie on that domain (POINT, FACE, CORNER, or none).
 
-    `splats`: {attribute: its type} of splats, to which it adds what the motion changes.
+    `splats`: {attribute: its type} of splats, whose changes it adds.
     """
     name = f"{FIELD_MODIFIER} {normals.title()} Normals" if normals else FIELD_MODIFIER
     mark = f"{VERSION} {normals}"
@@ -31,23 +31,23 @@ def find_or_make(normals=PLAIN, splats=None):
 
 
 def find_or_make_layer(kind, number, normals=PLAIN):
-    """The same for a layer, whose motion has names of its own."""
+    """The group for a layer, whose motion has its own attribute names."""
     name, mark = f"{FIELD_MODIFIER} {kind.title()}", f"{VERSION} {kind} {number} {normals}"
     return kept_group(LAYER_GROUP, mark, lambda: build(name, normals, {}, number))
 
 
 def normals_of(modifier):
-    """Domain of the free custom normals that a field's modifier turns, or ""."""
+    """Domain of the free custom normals that a field's modifier rotates, or ""."""
     return "".join(modifier.node_group[FIELD_GROUP].split()[1:])
 
 
 def names_of(number=""):
-    """The attributes of a motion: offsets, turns; of a layer with its number."""
+    """Attribute names (offsets, rotation vectors) of a motion, with the number of a layer."""
     return (f"{OFFSETS} {number}".rstrip(), f"{TURNS} {number}".rstrip())
 
 
 def kept_group(key, mark, build):
-    """The file's own group with this mark under its custom property `key`; built where there is none."""
+    """The local node group whose custom property `key` is `mark`; built if missing."""
     for group in list(bpy.data.node_groups):
         if group.get(key) == mark and group.library is None:
             return group
@@ -78,7 +78,7 @@ def build(name, normals, splats, number=""):
 
 
 def add_change(graph, geometry, attribute, kind, strength):
-    """Adds `strength` of its change to an attribute."""
+    """Adds nodes that add an attribute's change, times `strength`, to it."""
     own, change = (
         graph.node("GeometryNodeInputNamedAttribute", name, data_type=data_type).outputs[0]
         for name, data_type in ((attribute, kind), (CHANGES + attribute, CHANGE_KINDS.get(kind, kind)))
@@ -100,7 +100,7 @@ def add_change(graph, geometry, attribute, kind, strength):
 
 
 def turn_normals(graph, geometry, turns, strength, domain):
-    """Turns free custom normals about the axis of each turn (axis · angle), by `strength` of its angle."""
+    """Adds nodes that rotate free custom normals by rotation vectors (axis · angle), scaled by `strength`."""
     angle = graph.node("ShaderNodeVectorMath", turns, operation="LENGTH").outputs["Value"]
     part = graph.node("ShaderNodeMath", angle, strength, operation="MULTIPLY").outputs[0]
     normal = graph.node("GeometryNodeInputNamedAttribute", FREE_NORMALS, data_type="FLOAT_VECTOR").outputs[0]
@@ -111,11 +111,11 @@ def turn_normals(graph, geometry, turns, strength, domain):
 
 
 class Graph:
-    """A new group that takes and gives geometry; makes nodes and links, from left to right."""
+    """A new node group with geometry input and output; makes nodes and links, from left to right."""
 
     def __init__(self, name):
         self.group, self.count = bpy.data.node_groups.new(name, "GeometryNodeTree"), 0
-        self.group.is_modifier = False  # it would be offered under Add Modifier, and do nothing
+        self.group.is_modifier = False  # keeps it out of the Add Modifier menu, where it has no effect
         self.socket("Geometry", "INPUT", "NodeSocketGeometry")
 
     def socket(self, name, way, kind, description=""):
@@ -130,7 +130,7 @@ class Graph:
             one.default_value, one.min_value, one.max_value, one.subtype = 1.0, 0.0, 1.0, "FACTOR"
 
     def node(self, kind, *inputs, into=(), **settings):
-        """A node with these settings, then these outputs or values in its first inputs, or in named ones."""
+        """A node with these settings, and these outputs or values in its first inputs, or in named ones."""
         node = self.group.nodes.new(kind)
         node.location = 190 * (self.count % 8), -220 * (self.count // 8)
         self.count += 1
@@ -142,7 +142,7 @@ class Graph:
         return node
 
     def put(self, socket, value):
-        """Gives an input a value, or links an output to it."""
+        """Sets an input's value, or links an output to it."""
         if isinstance(value, bpy.types.NodeSocket):
             self.group.links.new(value, socket)
         else:
@@ -152,7 +152,7 @@ class Graph:
         return self.node("ShaderNodeMath", factor, change, number, operation="MULTIPLY_ADD").outputs[0]
 
     def acts(self, strength):
-        """Whether a strength is not 0; elsewhere the points stay bit for bit."""
+        """Selection of points with a strength other than 0; the others stay bit for bit."""
         into = {"A": strength, "Epsilon": 0.0}
         return self.node("FunctionNodeCompare", into=into, data_type="FLOAT", operation="NOT_EQUAL").outputs[
             0
@@ -164,7 +164,7 @@ class Graph:
 
 
 class AttributeSource:
-    """Attributes of the geometry itself, or of the helper mesh where there is one."""
+    """Attributes of the geometry itself, or of the helper mesh if there is one."""
 
     def __init__(self, graph, geometry, helper):
         self.graph = graph

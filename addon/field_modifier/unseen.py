@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the user has the field's modifier show nothing."""
+"""Checks whether the user has disabled the field's modifier."""
 
 from ..blender import modifier_stack
 from ..blender.actions import has_keys
@@ -8,7 +8,7 @@ from . import inputs
 
 
 def reasons(source):
-    """[UserError] where nothing of the field is seen, and keys or drivers do not change that."""
+    """[UserError] if the field's modifier is off or its Factor 0, and neither is animated."""
     modifier = modifier_stack.find(source)
     if modifier is None or (modifier.show_viewport and inputs.get(modifier, "Factor") != 0.0):
         return []

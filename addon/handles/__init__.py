@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Empties that hold and move parts of an object."""
+"""Handles: Empties and bones that hold and move parts of an object."""

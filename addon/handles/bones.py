@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bones of armatures as handles: what a bone holds follows the posed bone."""
+"""Bones as handles: the region that a bone holds follows the pose bone."""
 
 import bpy
 import numpy as np
@@ -10,12 +10,12 @@ from ..blender.object_references import in_scene, settings_of
 from ..core.errors import UserError
 from . import empties, movers
 
-LEAST_HELD = 4  # samples about a bone without a group: of fewer, another draw may have none
-HOLD_FROM = 0.8  # weight of a bone's group from which it holds; between two bones the surface bends freely
+LEAST_HELD = 4  # least number of samples for a bone without a group: with fewer, other samples may miss it
+HOLD_FROM = 0.8  # least weight of a bone's group that is held; between two bones the surface bends freely
 
 
 def armature_of(context, source):
-    """The armature that is selected, or the one that the mesh follows; UserError where there is none."""
+    """The selected armature, or the one that deforms the mesh; UserError without one."""
     selected = [item for item in context.selected_objects if item.type == "ARMATURE"]
     moved_by = [m.object for m in source.modifiers if m.type == "ARMATURE" and in_scene(m.object)]
     parents = [source.parent] if source.parent is not None and source.parent.type == "ARMATURE" else []
@@ -28,15 +28,15 @@ def armature_of(context, source):
 
 
 def is_selected(rig, name):
-    """Whether a bone is selected; Blender 5 keeps that with the posed bone."""
+    """Whether a bone is selected; Blender 5 stores that in the pose bone."""
     pose = rig.pose.bones[name]
     return pose.select if hasattr(pose, "select") else pose.bone.select
 
 
 def chosen(rig, which, holding):
-    """Names of the bones to make handles of, by the choices of BONES; UserError where there are none.
+    """Names of the bones to make handles of, by the enum BONES; UserError without any.
 
-    `holding` are the names of the vertex groups that hold something.
+    `holding`: names of the vertex groups that are not empty.
     """
     names = []
     if which == "SELECTED" or (which == "AUTO" and rig.mode == "POSE"):
@@ -50,16 +50,16 @@ def chosen(rig, which, holding):
 
 
 def holding_groups(context, source):
-    """Names of the groups that hold a vertex of the shape that is worked on, mirrored sides and all."""
+    """Names of the groups with a vertex in the shape to solve, including sides made by Mirror modifiers."""
     with modifier_stack.evaluated_mesh(context, source, settings_of(source).in_place) as mesh:
         indices = {entry.group for vertex in mesh.vertices for entry in vertex.groups if entry.weight > 0}
     return {group.name for group in source.vertex_groups if group.index in indices}
 
 
 def unposed(context, source):
-    """Why meshes that a source carries stay behind its bones, as a UserError; None where none does.
+    """UserError that names carried meshes which do not follow all of their bones; else None.
 
-    A carried mesh goes with the source alone: not with bones that only its own vertex groups name.
+    A carried mesh follows the source only, not bones that only its own vertex groups name.
     """
     handles = {(entry.rig, movers.bone_of(entry)) for entry in settings_of(source).handles if is_bone(entry)}
     rigs, names = {rig for rig, _ in handles if in_scene(rig)}, []
@@ -89,14 +89,14 @@ def find(source, rig, name):
 
 
 def is_bone(entry):
-    """Whether a handle is the bone of an armature, one that is there."""
+    """Whether a handle is a bone of an existing armature."""
     return entry.kind == "BONE" and entry.rig is not None
 
 
 def add(source, rig, name, groups):
-    """Makes a bone a handle of the source, at rest where the bone rests; one it was already is only reset.
+    """Makes a bone a handle of the source, with the rest bone as rest pose; resets an existing one.
 
-    `groups` are the names of the vertex groups that hold something.
+    `groups`: names of the vertex groups that are not empty.
     """
     index = find(source, rig, name)
     entry = empties.choose_or_add(settings_of(source), index)
@@ -110,7 +110,7 @@ def add(source, rig, name, groups):
 
 
 def keep_holding(source, rig, names):
-    """Takes bones off the list that hold nothing; returns the names of the others, UserError without any."""
+    """Removes handles of bones that hold nothing; returns the other names, UserError without any."""
     held = []
     for name in names:
         index = find(source, rig, name)
@@ -125,13 +125,13 @@ def keep_holding(source, rig, names):
 
 
 def rest_in_world(rig, name):
-    """The cube [-1, 1]³ → world, of a bone at rest."""
+    """(4, 4) cube [-1, 1]³ → world, of a bone at rest."""
     bone = rig.data.bones[name]
     return empties.matrix_of(rig) @ np.array(bone.matrix_local, dtype=np.float64) @ movers.bone_box(bone)
 
 
 def mirror(context, source, entry):
-    """A handle of the bone on the other side."""
+    """Makes a handle of the mirrored bone, with the same settings."""
     bone = movers.bone_of(entry)
     name = bpy.utils.flip_name(bone)
     if name == bone or name not in entry.rig.data.bones:

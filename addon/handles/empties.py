@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Empties as handles: rest boxes kept in the source's coordinates, motions read from where they are now."""
+"""Empties as handles: rest boxes are stored in the source's coordinates, targets read from the Empties."""
 
 import bpy
 import numpy as np
@@ -20,24 +20,24 @@ from .palette import free_colour
 
 
 def rest_box(source, entry, where=matrix_of):
-    """The cube [-1, 1]³ → world, of a handle's rest box; it goes where the source goes."""
+    """(4, 4) cube [-1, 1]³ → world, of a handle's rest box, which moves with the source."""
     return where(source) @ movers.rest_of(entry)
 
 
 def store_rest(source, entry):
-    """Makes where the handle's Empty or bone is now its rest pose."""
+    """Stores the present pose of the handle's Empty or bone as its rest pose."""
     relative = inverse(matrix_of(source)) @ box_now(entry)
     entry.rest, entry.unwrapped = relative.ravel(), np.zeros(16)
     entry.frame = bpy.context.scene.frame_current
 
 
 def used(source):
-    """The handles whose Empties or bones are still there."""
+    """The handles whose Empties or bones still exist."""
     return [entry for entry in settings_of(source).handles if has_mover(entry)]
 
 
 def lost_bone(source):
-    """The UserError that names a bone that its armature has no more; None where all are there."""
+    """UserError that names a bone missing in its armature; else None."""
     for entry in settings_of(source).handles:
         if entry.kind == "BONE" and in_scene(entry.rig) and not has_mover(entry):
             names = {"rig": entry.rig.name, "bone": entry.bone}
@@ -46,7 +46,7 @@ def lost_bone(source):
 
 
 def require_handles(source):
-    """Why a source's handles cannot be followed, as a UserError; None where they can."""
+    """UserError that says why a source's handles cannot be followed; else None."""
     reason = lost_bone(source) or movers.frozen(used(source))
     if reason is not None:
         return reason
@@ -67,15 +67,15 @@ def find(source, empty):
 
 
 def group_names(source):
-    """The vertex groups that the source's handles hold."""
+    """The vertex groups that the source's handles use."""
     return [movers.group_of(e) for e in used(source) if e.kind == "GROUP" or (e.kind == "BONE" and e.group)]
 
 
 def solve_handles(source, space, weights=None, where=matrix_of):
-    """All handles of a source as the solver wants them; UserError when there is none.
+    """All handles of a source for the solver; UserError without any.
 
-    `weights` are those of the vertex groups by name; without them, groups say only where they go.
-    `where(object, bone)` is the world matrix of an object or of its posed bone.
+    `weights`: of the vertex groups, by name; without them, the handles have targets only.
+    `where(object, bone)`: the world matrix of an object or of its pose bone.
     """
     refuse(lost_bone(source))
     handles = []
@@ -101,10 +101,10 @@ def solve_handles(source, space, weights=None, where=matrix_of):
 
 
 def kept_rest(source):
-    """(places in the source's coordinates, distance): what is farther from all of these holds its place.
+    """(pin centers in the source's coordinates, distance): points farther from all centers stay in place.
 
-    Without places nothing does: there are handles other than pins, or only anchors. Distance 0 is the rule of
-    earlier files: beyond half of the way to the farthest point, while there is no anchor.
+    No centers, and no such points, if there are handles other than pins, or only anchors. Distance 0 is the
+    rule of earlier files: half of the distance to the farthest point, if there is no anchor.
     """
     settings, entries = settings_of(source), used(source)
     pins = all(entry.kind in PINS for entry in entries)
@@ -116,19 +116,19 @@ def kept_rest(source):
     return (), 0.0
 
 
-PINS = ("PIN", "POINT")  # which hold place and turn, and the place alone
+PINS = ("PIN", "POINT")  # these hold location and rotation, and location only
 SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS", "PIN": "SPHERE"}
 
 
 def add(source, empty, kind="CUBE"):
-    """Turns an Empty into a handle of the source, at rest where it is; one it was already is only reset."""
+    """Makes an Empty a handle of the source, with its present pose as rest pose; resets an existing one."""
     if empty.empty_display_type == "IMAGE":
         raise UserError("{name} shows an image; take another kind of Empty", empty)
     if abs(np.linalg.det(current_box(empty)[:3, :3])) == 0:
         raise UserError("{name} is flat; give it a size and a scale other than zero", empty)
     settings = settings_of(source)
     owner = settings_of(empty).handle_of
-    if owner is not None and owner != source and find(owner, empty) >= 0:  # a copy of a handle is none
+    if owner is not None and owner != source and find(owner, empty) >= 0:  # a duplicate of a handle is none
         remove(owner, find(owner, empty))
     entry = choose_or_add(settings, find(source, empty))
     entry.empty, entry.kind, entry.rig, entry.bone = empty, kind, None, ""
@@ -139,7 +139,7 @@ def add(source, empty, kind="CUBE"):
 
 
 def choose_or_add(settings, index):
-    """The handle in that row, or where it is -1 a new one, as the chosen one."""
+    """The handle in that row, or a new one for -1; makes its row active."""
     if index < 0:
         index, colour = len(settings.handles), free_colour(settings.handles)
         settings.handles.add().colour = colour
@@ -163,7 +163,7 @@ def editable(context):
 
 
 def can_place(source, kind, place):
-    """Whether the source has what such a handle is made around, as far as that is known at once."""
+    """Whether the source has vertex groups, or a selection, for such a new handle; a quick check."""
     if source is None or (kind == "GROUP" and not source.vertex_groups):
         return False
     return place != "SELECTION" or source.mode != "EDIT" or getattr(source.data, "total_vert_sel", 1) > 0
@@ -189,7 +189,7 @@ def new_empty(context, source, kind, group, place):
 
 
 def selection_box(source, size):
-    """(4, 4) the cube [-1, 1]³ → world, of the box along the source's axes around its selected vertices."""
+    """(4, 4) cube [-1, 1]³ → world, of the box along the source's axes around its selected vertices."""
     if source.mode == "EDIT":
         source.update_from_editmode()
     mesh = source.data
@@ -208,7 +208,7 @@ def selection_box(source, size):
 
 
 def mirror(context, source, entry, axis):
-    """A new handle like this one on the other side of the source's axis (0, 1 or 2)."""
+    """Adds a handle mirrored across the plane where the source's axis (0, 1 or 2) is 0."""
     flip = np.eye(4)
     flip[axis, axis] = -1.0
     world = matrix_of(source)
@@ -236,7 +236,7 @@ def reset(source, entry):
 
 
 def remove(source, index):
-    """Takes a handle off the source's list; its Empty stays as an ordinary one."""
+    """Removes a handle from the source's list; its Empty stays as an ordinary one."""
     settings = settings_of(source)
     empty = settings.handles[index].empty
     if empty is not None and settings_of(empty).handle_of == source:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Empties of handles go with the surface that they hold where a wrap moves it, or is taken off.
+"""Moves Empties of handles with the surface that they hold, when a wrap is applied or removed.
 
-Where a deformation would not act on what the wrap has made (layers.py), they stay.
+They stay if a deformation would not act on the wrap's result (layers.py).
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ from .movers import box_now, matrix_of, rest_of
 
 
 class Followers:
-    """The handles of a source, before its surface goes elsewhere."""
+    """The handles of a source, made before its surface changes."""
 
     def __init__(self, context, source):
         entries = [entry for entry in empties.used(source) if entry.kind != "BONE"]
@@ -26,8 +26,8 @@ class Followers:
         self.is_wrapped = settings_of(source).moved_by == "WRAP"
 
     def follow(self, context, source, back=False):
-        """Moves handles at rest, and their Empties as far, to where the surface is now; `back` to where they
-        were before a wrap took them along."""
+        """Moves rest boxes with the surface, and their Empties by the same motion; `back`: to the rest boxes
+        from before the wrap."""
         after = None if self.before is None else seen(context, source)
         if after is None or len(after) != len(self.before) or np.array_equal(after, self.before):
             return
@@ -58,11 +58,11 @@ class Followers:
 
 
 def seen(context, source):
-    """(n, 3) vertices in the world of the shape on which a deformation acts."""
+    """(n, 3) world vertices of the shape that a deformation acts on."""
     with modifier_stack.mesh_of(context, source, layers.below_pose(source, in_place=True)) as mesh:
         return transform(matrix_of(source), mesh_arrays.positions(mesh))
 
 
 def is_free(empty):
-    """Whether an Empty's place is its own."""
+    """Whether an Empty can be moved: local and not driven."""
     return empty.library is None and empty.override_library is None and not is_driven(empty)

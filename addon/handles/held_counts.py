@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How many points of the surface each handle holds at rest.
+"""Counts the surface samples that each handle holds at rest.
 
-Counted at once; for large meshes in a window by a worker, while the window goes on.
+Counts at once; for large meshes in Blender with a window, on a worker thread.
 """
 
 import bpy
@@ -20,14 +20,14 @@ from ..field_modifier import layers
 from . import empties, movers, subdivided
 from .native_handles import Holding
 
-COUNTED = 4000  # samples of the surface of which a handle's part is told
-LARGE = 20000  # vertices from which a window does not wait
-INTERVAL = 0.03  # seconds between looks at the worker
-pending = {}  # session_uid of the source → the coroutine that counts
+COUNTED = 4000  # number of surface samples
+LARGE = 20000  # number of vertices from which a worker counts
+INTERVAL = 0.03  # seconds between calls of the timer
+pending = {}  # {session_uid of the source: coroutine that counts}
 
 
 def count_inside(context, source, at_once=False):
-    """Stores each handle's count with it."""
+    """Counts and stores `inside` of each handle."""
     coroutine = counting(context, source)
     if at_once or not has_window() or len(points_of(source.data)) < LARGE:
         run_to_completion(coroutine)
@@ -61,7 +61,7 @@ def counting(context, source):
         while worker.is_alive():
             yield Pause.WORKER
     finally:
-        worker.join()  # also where the coroutine is dropped: the extension is being disabled
+        worker.join()  # also if the coroutine is closed, when the extension is disabled
     if failures:
         raise failures[0]
     for entry in empties.used(reference.get()):
@@ -69,15 +69,14 @@ def counting(context, source):
 
 
 def region_of(entry, weights):
-    """A handle where it is at rest, in the source's coordinates."""
+    """The Handle at rest, in the source's coordinates."""
     rest = movers.rest_of(entry)
     return Handle("", entry.kind, rest, rest, weights.get(movers.group_of(entry)), hold_from=entry.hold_from)
 
 
 def points_inside(mesh, regions, shown):
-    """{the handle's key: points that it holds, -1 for a point or a pin}; on the worker.
-
-    `shown` is what subdivided.read() gives."""
+    """{handle's key: number of points that it holds, -1 for a point or a pin}; on the worker.
+    `shown`: result of subdivided.read()."""
     if mesh.splats is not None:
         points = mesh.vertices
     else:
@@ -94,11 +93,11 @@ def points_inside(mesh, regions, shown):
 
 
 def poll_counts():
-    """Called between events; ends when nothing is left to count."""
+    """Timer callback; unregisters itself when nothing is left to count."""
     for uid, coroutine in list(pending.items()):
         try:
             ended = step_for(coroutine)
-        except (UserError, ValueError, ReferenceError):  # the object went, or changed: nothing to tell
+        except (UserError, ValueError, ReferenceError):  # the object was removed or has changed
             ended = True
         if ended:
             pending.pop(uid, None)

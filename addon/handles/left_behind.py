@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handles whose source was deleted: a question whether their Empties go, too."""
+"""After the deletion of a source: asks whether to delete the Empties of its handles."""
 
 import functools
 
@@ -14,18 +14,18 @@ from ..blender.source_operator import ReportingOperator
 from ..names import Op
 from . import empties
 
-seen = {}  # "count" → objects of the view layer when looked at last
+seen = {}  # "count": number of objects in the view layer at the last check
 
 
 def of_deleted():
-    """{source that is in no scene: Empties of its handles that are in one}."""
+    """{source in no scene: Empties of its handles that are in a scene}."""
     gone = [item for item in bpy.data.objects if settings_of(item).handles and not in_scene(item)]
     left = {source: [e.empty for e in empties.used(source) if e.kind != "BONE"] for source in gone}
     return {source: items for source, items in left.items() if items}
 
 
 def follow(context):
-    """Looks whether objects went; called after Blender's updates."""
+    """Checks whether objects were deleted; called after depsgraph updates."""
     count = len(context.view_layer.objects) if getattr(context, "view_layer", None) else 0
     if count < seen.get("count", 0) and has_window() and of_deleted():
         timers.start(ask)
@@ -33,7 +33,7 @@ def follow(context):
 
 
 def ask():
-    """Called between events: a menu under the mouse."""
+    """Timer callback: opens a popup menu under the mouse."""
     for source, items in of_deleted().items():
         title = translated("{name} was deleted", name=source.name)
         offer = functools.partial(draw, source.name, len(items))

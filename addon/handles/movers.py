@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Empty or the bone that moves a handle, and its place."""
+"""Movers: the Empty or the bone that moves a handle, and its matrix."""
 
 import bpy
 import numpy as np
@@ -12,27 +12,27 @@ from ..names import BONE_NUMBER
 
 
 def matrix_of(item, bone=""):
-    """(4, 4) the world matrix of an object, or of its posed bone of that name."""
+    """(4, 4) world matrix of an object, or of its pose bone of that name."""
     matrix = np.array(world_matrix(item), dtype=np.float64)
     return matrix @ np.array(item.pose.bones[bone].matrix, dtype=np.float64) if bone else matrix
 
 
 def is_frozen(item):
-    """Whether an object moves, but is disabled, so that Blender does not move it."""
+    """Whether an object is animated or driven, but disabled, so that Blender does not evaluate it."""
     bones, parent = item.pose.bones if item.pose is not None else (), item.parent
     moves = is_moved(item) or any(bone.constraints for bone in bones)
     return is_disabled(item) and (moves or (parent is not None and is_frozen(parent)))
 
 
 def is_needed(item, source):
-    """Whether Blender evaluates a disabled object nevertheless, as others than the source hang on it."""
+    """Whether Blender evaluates a disabled object, as enabled objects other than the source use it."""
     users = bpy.data.user_map(subset=[item])[item]
     others = [one for one in users if isinstance(one, bpy.types.Object) and one not in (source, item)]
     return any(not is_disabled(one) for one in others)
 
 
 def frozen(entries):
-    """The UserError that names what moves a handle where that is so; None where all of them go on."""
+    """UserError that names a mover which is disabled and not evaluated; else None."""
     for entry in entries:
         mover = mover_of(entry)
         if is_frozen(mover) and not is_needed(mover, entry.id_data):
@@ -43,17 +43,17 @@ def frozen(entries):
 
 
 def rest_of(entry):
-    """The cube [-1, 1]³ → the source's coordinates, of a handle's rest box."""
+    """(4, 4) cube [-1, 1]³ → the source's coordinates, of a handle's rest box."""
     return np.array(entry.rest, dtype=np.float64).reshape(4, 4)
 
 
 def current_box(empty, where=matrix_of):
-    """The cube [-1, 1]³ → world, of an Empty where it is now."""
+    """(4, 4) cube [-1, 1]³ → world, of an Empty's present box."""
     return box_matrix(where(empty), empty.empty_display_size)
 
 
 def bone_of(entry):
-    """The name that a handle's bone has now."""
+    """The present name of a handle's bone, found by its number."""
     bones = entry.rig.data.bones
     named = bones.get(entry.bone)
     if not entry.number or (named is not None and getattr(named, BONE_NUMBER) == entry.number):
@@ -62,7 +62,7 @@ def bone_of(entry):
 
 
 def group_of(entry):
-    """The name that a handle's vertex group has now: Blender renames groups with their bones."""
+    """The present name of a handle's vertex group: Blender renames groups with their bones."""
     if entry.kind != "BONE" or not entry.group or entry.group != entry.bone or not in_scene(entry.rig):
         return entry.group
     name = bone_of(entry)
@@ -70,7 +70,7 @@ def group_of(entry):
 
 
 def follow_rename(entry):
-    """Notes the names that a handle's bone and its vertex group have now."""
+    """Stores the present names of a handle's bone and its vertex group."""
     if entry.kind != "BONE":
         return
     if bone_of(entry) != entry.bone:
@@ -80,7 +80,7 @@ def follow_rename(entry):
 
 
 def numbered(rig, name):
-    """The number of a bone, a new one where it has none or that of another; 0 where that cannot be."""
+    """The number of a bone, new if it has none or another bone's; 0 if the armature cannot be changed."""
     bones, bone = rig.data.bones, rig.data.bones[name]
     first = next(one for one in bones if getattr(one, BONE_NUMBER) == getattr(bone, BONE_NUMBER))
     if getattr(bone, BONE_NUMBER) and first == bone:
@@ -92,7 +92,7 @@ def numbered(rig, name):
 
 
 def box_now(entry, where=matrix_of):
-    """The cube [-1, 1]³ → world, of a handle where it is now."""
+    """(4, 4) cube [-1, 1]³ → world, of a handle's present box."""
     if entry.kind == "BONE":
         name = bone_of(entry)
         return where(entry.rig, name) @ bone_box(entry.rig.data.bones[name])
@@ -100,7 +100,7 @@ def box_now(entry, where=matrix_of):
 
 
 def bone_box(bone):
-    """The cube [-1, 1]³ → a bone's own coordinates: as long as the bone, as wide as its envelope reaches."""
+    """(4, 4) cube [-1, 1]³ → a bone's own coordinates: as long as the bone, as wide as its envelope."""
     half_width = max(bone.envelope_distance + (bone.head_radius + bone.tail_radius) / 2, 0.2 * bone.length)
     box = np.diag([half_width, bone.length / 2, half_width, 1.0])
     box[1, 3] = bone.length / 2
@@ -108,7 +108,7 @@ def bone_box(bone):
 
 
 def owner_elsewhere(entry):
-    """The object whose handle an entry's Empty is, where that is another: copies of objects list the same."""
+    """The other object that owns an entry's Empty, or None: duplicates of a source list the same Empties."""
     owner = settings_of(entry.empty).handle_of
     if owner in (None, entry.id_data) or not in_scene(owner):
         return None
@@ -134,7 +134,7 @@ USER_SETTINGS = ("weight", "hold_from", "reach", "allow_scale")
 
 
 def user_settings(entry):
-    """{property: value} of what the user sets of a handle, whatever moves it."""
+    """{property: value} of a handle's user settings."""
     return {name: getattr(entry, name) for name in USER_SETTINGS}
 
 
@@ -144,5 +144,5 @@ def put_user_settings(entry, values):
 
 
 def key_of(entry):
-    """A key of a source's handle. It stays when the handle is renamed, or others are removed."""
+    """Key of a source's handle, unaffected by its renaming and by the removal of others."""
     return mover_of(entry).session_uid, bone_of(entry) if entry.kind == "BONE" else ""

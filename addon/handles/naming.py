@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names of handles by what they hold: "head" where that vertex group is, else "Handle 3"."""
+"""Names of handles, by the vertex group that they hold, such as "head", else "Handle 3"."""
 
 import re
 
@@ -11,8 +11,8 @@ from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 
-RIG_PREFIX = re.compile(r"^(DEF|ORG|MCH)-")  # by which rigs tell their bones' purposes
-BLENDERS_OWN = re.compile(r"(\.\d{3,})?$")  # what Blender appends to a name that is taken
+RIG_PREFIX = re.compile(r"^(DEF|ORG|MCH)-")  # prefixes of bones in generated rigs
+BLENDERS_OWN = re.compile(r"(\.\d{3,})?$")  # suffix that Blender appends to a used name
 
 
 def name_for(obj, point_world, kind) -> str:
@@ -25,24 +25,24 @@ def name_for(obj, point_world, kind) -> str:
 
 
 def name_of_group(group):
-    """A vertex group's name without what rigs put before it."""
+    """A vertex group's name without a rig's prefix."""
     return RIG_PREFIX.sub("", group)
 
 
 def group_at(obj, point_world):
-    """The vertex group that is strongest at the vertex nearest to a point of the world; "" for none."""
+    """The vertex group with the largest weight at the vertex nearest to a world location; "" for none."""
     try:
         with modifier_stack.evaluated_mesh(bpy.context, obj, settings_of(obj).in_place) as mesh:
             index = nearest(mesh, obj, point_world)
             weights = [] if index is None else [(e.weight, e.group) for e in mesh.vertices[index].groups]
-    except UserError:  # there is no mesh to look at
+    except UserError:  # no mesh to read
         return ""
     weights = [entry for entry in weights if entry[0] > 0]
     return obj.vertex_groups[max(weights)[1]].name if weights else ""
 
 
 def nearest(mesh, obj, point_world):
-    """Number of the vertex nearest to a point of the world; None where there is none."""
+    """Index of the vertex nearest to a world location; None without vertices."""
     points = mesh_arrays.positions(mesh)
     if not len(points):
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handles as the native solver takes them, with the samples that each holds."""
+"""Converts handles to native ones, with the samples that each holds."""
 
 from ..blender.vertex_groups import NearestVertices
 from ..core.geometry.handles import far_from, require_held
@@ -9,8 +9,8 @@ from . import subdivided
 def native_handles(af, handles, rest, samples, reaches=True):
     """Native handles; UserError that names those without a sample. Runs on the worker.
 
-    `handles` are core.geometry.handles.Handle, `rest` is the source's surface at rest. `reaches`: whether the
-    handles' reaches count; a style acts everywhere.
+    `handles`: core.geometry.handles.Handle, `rest`: the source's surface at rest. `reaches`: whether to use
+    the handles' reach; a style acts everywhere.
     """
     counts, natives, holding = {}, [], Holding(rest.vertices, samples.points, handles)
     for handle in handles:
@@ -38,7 +38,7 @@ def native_handles(af, handles, rest, samples, reaches=True):
 
 
 class Holding:
-    """Which (p, 3) points of a surface groups and bones hold; their weights are those of `vertices`."""
+    """The (p, 3) surface points that groups and bones hold; their weights are given at `vertices`."""
 
     def __init__(self, vertices, points, handles):
         self.vertices, self.points, self.handles = vertices, points, handles

@@ -20,7 +20,7 @@ class HandleOperator(SourceOperator):
     bl_options = {"REGISTER", "UNDO"}
     guide = "handles"
     needs_handle = True
-    counts_points = False  # whether it counts what the handles hold
+    counts_points = False  # whether it counts the points that handles hold
 
     @classmethod
     def obstacle(cls, context):
@@ -32,14 +32,14 @@ class HandleOperator(SourceOperator):
         return UserError("The object has no handle") if without else None
 
     def warn(self, context):
-        """Says which handles hold nothing; a solve would refuse them."""
+        """Reports handles that hold nothing, which a solve would refuse."""
         names = empties.holding_nothing(source_of(context)) if self.counts_points else ()
         if names:
             self.report({"WARNING"}, translated(nothing_held(names)))
 
 
 def chosen_entries(context, source):
-    """The handles whose Empties are selected, or the one chosen in the list."""
+    """The handles whose Empties are selected, or the active one of the list."""
     settings = settings_of(source)
     selected = [entry for entry in empties.used(source) if is_selected(context, entry)]
     if selected:
@@ -135,7 +135,7 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
     def change(self, context, source):
         entries = [e for e in chosen_entries(context, source) if movers.has_mover(e)]
         keys = [movers.key_of(entry) for entry in entries]
-        for key in keys:  # entries move in memory as others are added
+        for key in keys:  # adding entries invalidates references
             entry = next(entry for entry in empties.used(source) if movers.key_of(entry) == key)
             if entry.kind == "BONE":
                 bones.mirror(context, source, entry)

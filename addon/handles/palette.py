@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours of handles: each far from the others, from a grey viewport and from Blender's selection orange."""
+"""Colours of handles: distinct from each other, from a grey viewport and from Blender's selection orange."""
 
 PALETTE = [
     *((0.27, 0.55, 1.0), (1.0, 0.42, 0.30), (0.35, 0.80, 0.40), (0.85, 0.45, 0.90), (1.0, 0.80, 0.25)),
@@ -10,7 +10,7 @@ PALETTE = [
 
 
 def free_colour(handles):
-    """The first colour that the fewest of these handles have."""
+    """The colour that the fewest of these handles have."""
     counts = [sum(is_colour(entry.colour, colour) for entry in handles) for colour in PALETTE]
     return PALETTE[counts.index(min(counts))]
 

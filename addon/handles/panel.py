@@ -12,13 +12,13 @@ ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX", "PIN": "PINNED
 
 
 def anchor_icon(entry):
-    """An anchor where it is one, as keywords of a layout's call."""
+    """The icon of a handle or an anchor, as keyword arguments of UILayout functions."""
     number = icons.icon("ANCHOR") if entry.anchor else 0
     return {"icon_value": number} if number else {"icon": "PINNED" if entry.anchor else "LAYER_USED"}
 
 
 def draw_lost(row, entry):
-    """The row of a handle that nothing moves, or that moves another object."""
+    """Draws the row of a handle without a mover, or whose Empty belongs to another object."""
     owner = movers.owner_elsewhere(entry) if entry.kind != "BONE" and in_scene(entry.empty) else None
     if owner is None:
         row.label(text="(deleted)", icon="ERROR")

@@ -6,7 +6,7 @@ import bpy
 from ..blender.property_definitions import choice, colour, flag, integer, listeners, number, pointer, text
 from ..core.settings.choices import HANDLE_KINDS
 
-UNKNOWN_FRAME = -1048575  # before the first that Blender has
+UNKNOWN_FRAME = -1048575  # below Blender's lowest frame
 
 
 def is_armature(_, item):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A handle's box is resized by its faces: what it holds at rest changes, its motion stays."""
+"""Resizes a handle's box by its faces: changes the region that it holds, not its motion."""
 
 import bpy
 import numpy as np
@@ -12,12 +12,12 @@ from ..core.errors import UserError
 from ..names import Op
 from . import empties, held_counts, movers
 
-LEAST = 0.05  # of a box's size that one drag leaves of it
+LEAST = 0.05  # least share of a box's size after one drag
 FACES = [(axis, side) for axis in range(3) for side in (-1, 1)]
 
 
 def boxed(context):
-    """(source, entry) of the box whose Empty is active; UserError where there is none."""
+    """(source, entry) of the box whose Empty is active; UserError without one."""
     empty = context.view_layer.objects.active if context.view_layer else None
     source = owner_of(empty) if empty is not None and empty.type == "EMPTY" else None
     index = empties.find(source, empty) if source is not None else -1
@@ -27,7 +27,7 @@ def boxed(context):
 
 
 def stretch(axis, side, share):
-    """(4, 4) the map of the cube [-1, 1]³ that moves one face outwards by that share of the box's size."""
+    """(4, 4) map of the cube [-1, 1]³ that moves one face outwards by that share of the box's size."""
     share = max(share, LEAST - 1.0)
     moved = np.eye(4)
     moved[axis, axis], moved[axis, 3] = 1.0 + share, side * share
@@ -35,7 +35,7 @@ def stretch(axis, side, share):
 
 
 def resize(source, entry, box, rest, change):
-    """Gives a handle the box, (4, 4) cube → world, and the rest box, changed alike."""
+    """Applies `change` to a handle's box, (4, 4) cube → world, and to its rest box."""
     size = entry.empty.empty_display_size
     entry.empty.matrix_world = Matrix((box @ change @ np.diag([1 / size, 1 / size, 1 / size, 1])).tolist())
     entry.rest = (rest @ change).ravel()
@@ -88,7 +88,7 @@ class ARAPFIELDS_OT_resize_handle(Guided, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def pixels_of_the_box(self, context):
-        """(2,) pixels from one face to the other on the screen, outwards; None where they hide each other."""
+        """(2,) pixels on the screen from the opposite face to the dragged one; None if they coincide."""
         from bpy_extras.view3d_utils import location_3d_to_region_2d
 
         box = self._before[0]

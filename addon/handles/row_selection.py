@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A handle's row is chosen when its Empty becomes active; blender/selection.py has the other way."""
+"""Makes a handle's row active when its Empty becomes active; blender/selection.py does the reverse."""
 
 from ..blender.object_references import owner_of, settings_of
 from ..blender.selection import choose_row
 from . import empties
 
-seen = {}  # "active" → session_uid of the object that was active when looked at last
+seen = {}  # "active": session_uid of the active object at the last check
 
 
 def follow(context):
-    """Looks at the active object; called after Blender's updates."""
+    """Checks the active object; called after depsgraph updates."""
     layer = getattr(context, "view_layer", None)
     active = layer.objects.active if layer is not None else None
     uid = active.session_uid if active is not None else None

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handles that are scaled without having been asked to scale what they hold."""
+"""Handles that are scaled without Allow Scale."""
 
 import numpy as np
 
 from ..core.errors import UserError
 from . import empties, movers
 
-LEAST = 1e-3  # share by which a box differs from its rest size from where on it counts as scaled
+LEAST = 1e-3  # relative difference from the rest size above which a box counts as scaled
 
 
 def ignored(source):
-    """The error that names the handles whose scale counts for nothing; None where there is none."""
+    """UserError that names the handles whose scale is ignored; else None."""
     names = [movers.name_of(entry) for entry in empties.used(source) if is_ignored(source, entry)]
     if not names:
         return None

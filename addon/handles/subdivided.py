@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a Subdivision Surface behind the field shows the surface that the field moves."""
+"""Positions of the field's surface after a later Subdivision Surface modifier."""
 
 import math
 
@@ -10,7 +10,7 @@ from ..blender.evaluation import updated
 from ..blender.object_references import settings_of
 from ..blender.vertex_groups import NearestVertices
 
-MOST = 20000  # vertices from which the surface is subdivided no further
+MOST = 20000  # limit of vertices for subdivision
 
 
 def read(context, source, in_place, below, into=np.asarray):

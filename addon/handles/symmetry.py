@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the other side of a source is, while both sides move alike."""
+"""The mirror plane of a source whose sides are deformed symmetrically."""
 
 import numpy as np
 
@@ -10,9 +10,9 @@ from .movers import matrix_of
 
 
 def mirror_of(source):
-    """(4, 4) world → world, across the plane of the source's Symmetry; None where there is none.
+    """(4, 4) world → world reflection across the plane of the source's Symmetry; None without one.
 
-    Nor where the source is being stylized live, which heeds no symmetry, or its scale flattens it.
+    Also None while a style, which ignores symmetry, is live, or if the source's scale flattens it.
     """
     settings = settings_of(source)
     plane = settings.deform.symmetry.lower()
@@ -25,6 +25,6 @@ def mirror_of(source):
 
 
 def is_on_plane(mirror, box):
-    """Whether the middle of a box, cube [-1, 1]³ → world, is where the mirror has it too."""
+    """Whether the center of a box, cube [-1, 1]³ → world, is on the mirror plane."""
     extent = np.linalg.norm(box[:3, :3], axis=0).max()
     return np.linalg.norm((mirror @ box - box)[:3, 3]) <= 1e-3 * extent

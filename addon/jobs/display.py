@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the window shows of the running job, and the timer that drives it; all of it goes with the job."""
+"""Display of the running job in the window, and the timer that drives it; removed with the job."""
 
 import time
 
@@ -10,11 +10,11 @@ from ..blender.language import translated
 from ..blender.redraw import redraw
 from ..core.runtime.redraw_throttle import RedrawThrottle
 
-TICK = 0.03  # seconds between looks at the worker
+TICK = 0.03  # seconds between timer events
 
 
 class Display:
-    """Status bar, sidebar and preview of one job at a time, each drawn no more often than drawing allows."""
+    """Status bar, sidebar and preview of one job at a time, with throttled redraws."""
 
     def __init__(self):
         self._timer, self._previews = None, []
@@ -26,7 +26,7 @@ class Display:
         self._progress_throttle, self._preview_throttle = RedrawThrottle(0.25), RedrawThrottle(0.4)
 
     def note_arrival(self):
-        """A timer event has come; how late it is tells what drawing costs."""
+        """Called at a timer event; its delay measures the drawing cost."""
         late = time.monotonic() - self._left - TICK
         for throttle in (self._progress_throttle, self._preview_throttle):
             throttle.add_cost(late)
@@ -35,7 +35,7 @@ class Display:
         self._left = time.monotonic()
 
     def show(self, context, job):
-        """Redraws the viewport for a new preview and the sidebar for new words, each when it is due."""
+        """Redraws the viewport for a new preview and the sidebar for a new message, each when it is due."""
         now = time.monotonic()
         if self._preview_throttle.is_due(now) and user_preferences.shows("show_previews"):
             item, count, points = job.preview_points()
@@ -54,12 +54,12 @@ class Display:
             self._words = words
 
     def clear_previews(self):
-        """Takes away what is shown of results that are not there yet."""
+        """Removes the previews of results."""
         while self._previews:
             self._previews.pop().clear()
 
     def clear(self):
-        """Takes everything away: the job has ended, or the extension is being disabled."""
+        """Removes the display when the job has ended, or when the extension is disabled."""
         self.clear_previews()
         if self._timer is not None:
             timers.stop_events(self._timer)

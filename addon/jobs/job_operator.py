@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that run a job: at once and blocking from scripts, modal with progress in a window."""
+"""Operators that run a job: blocking from scripts, modal with progress in a window."""
 
 import types
 
@@ -36,11 +36,11 @@ class JobOperator(ModalRun, Guided):
 
     @classmethod
     def refuses(cls, source):
-        """Why this operator cannot work on a source that others can, as a UserError; else None."""
+        """UserError that says why this operator does not apply to a valid source; else None."""
         return None
 
     def sources(self, context):
-        """The objects to work on; none is ignored silently, what cannot be worked on becomes a failure."""
+        """The objects to process; objects that cannot be processed are listed in `failures`."""
         active = source_of(context)
         if self.scope == "ACTIVE":
             return [active]
@@ -53,7 +53,7 @@ class JobOperator(ModalRun, Guided):
         return [item for item, reason in refusals.items() if not reason]
 
     def in_place(self, source):
-        """Whether the shape that is worked on is that at the place of the field's modifier."""
+        """Whether the mesh is read at the field modifier's place in the stack."""
         return False
 
     def groups_of(self, source):
@@ -61,7 +61,7 @@ class JobOperator(ModalRun, Guided):
         return []
 
     def prepare(self, context, job):
-        """Coroutine that reads all sources, and their items; what cannot be planned is kept as a failure."""
+        """Coroutine that reads all sources, and their items; errors in planning go to `failures`."""
         items = []
         for reference in [ObjectReference(source) for source in self.sources(context)]:
             try:
@@ -76,7 +76,7 @@ class JobOperator(ModalRun, Guided):
         return items
 
     def coroutine(self, context):
-        """All that the main thread does; returns the operator's result."""
+        """Coroutine of the job's main-thread work; returns the operator's result."""
         self.failures, self.warnings, self.successes = [], [], []
         job = jobs.Job(self.title, [], native.library().Task, low_priority=self.in_window)
         jobs.begin(job, start=False)
@@ -96,14 +96,14 @@ class JobOperator(ModalRun, Guided):
         return result
 
     def work_beside(self, context, job):
-        """Coroutine of what the main thread does while the worker is at work."""
+        """Coroutine of main-thread work while the worker runs."""
         yield from ()
 
     def keep_undo_true(self):
-        """Stores a step where something changed though nothing came of it: Blender stores none."""
+        """Pushes an undo step if a failed job has changed data: Blender pushes none for it."""
 
     def clear_up(self, job):
-        """Removes what is not kept, however the job has ended."""
+        """Removes temporary data, however the job has ended."""
 
     def execute(self, context):
         coroutine = self.coroutine(context)
@@ -116,7 +116,7 @@ class JobOperator(ModalRun, Guided):
             jobs.stop()
 
     def conclude(self, context, job):
-        """Applies what the worker made, reports it, and returns the operator's result."""
+        """Applies and reports the worker's outcomes, and returns the operator's result."""
         cancelled = job.cancelled and not job.items
         for outcome in job.take_outcomes():
             self.warnings += [about(outcome.item.label, text) for text in outcome.warnings]
@@ -158,7 +158,7 @@ class JobOperator(ModalRun, Guided):
 
 
 def with_progress(job, coroutine, label):
-    """The same coroutine, which shows what is read and can be cancelled."""
+    """Wraps a coroutine to report progress and to allow cancellation."""
     while True:
         job.report_main_thread(0.0, translated("Reading {name}", name=label))
         try:
@@ -168,12 +168,12 @@ def with_progress(job, coroutine, label):
 
 
 def until_left(job, reference):
-    """Coroutine that waits while an object is in Edit Mode, whose end undoes what is written meanwhile."""
+    """Coroutine that waits while an object is in Edit Mode, whose exit overwrites changes of the mesh."""
     while (item := reference.find()) is not None and item.mode == "EDIT":
         job.report_main_thread(1.0, translated("{name} is in Edit Mode; leave it first", name=item.name))
         yield Pause.WORKER
 
 
 def busy():
-    """Why nothing can be started while a job runs; None when none does."""
+    """UserError if a job is running; else None."""
     return UserError("Wait for the running job, or cancel it") if jobs.running() else None

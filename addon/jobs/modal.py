@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A job beside the window's events: a modal operator that a timer wakes."""
+"""Modal operators with a timer, which run a job between the window's events."""
 
 from ..blender.host import has_window
 from ..blender.language import translated
@@ -11,7 +11,7 @@ from .display import display
 
 
 class Runs(set):
-    """Coroutines of the operators in the window."""
+    """Coroutines of the running modal operators."""
 
     def clear(self):
         """Ends them while their operators are there: Blender drops these with their class, unasked."""
