@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a running solve has so far, shown by the source itself: its field modifier moves, until the job ends.
+"""Preview of a running solve on the source itself, by its field modifier.
 
-Nothing of it stays: before the result is placed, the job cancelled, a step undone or the file saved, the
-motion that was there before is put back bit for bit. Steps that were pushed meanwhile hold it, so that it is
-put back in them as well when Blender returns to them.
+The earlier motion is restored bit for bit before the result is placed, the job cancelled, a step undone or
+the file saved. Undo steps pushed during the solve contain the preview, so the motion is also restored after
+undo or redo to them.
 """
 
 import hashlib
@@ -15,18 +15,18 @@ from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..field_modifier import motion
 
-WAIT = 0.2  # seconds between looks whether Edit Mode has been left
+WAIT = 0.2  # seconds between checks whether Edit Mode has ended
 
 
 class Steps(dict):
-    """{session_uid: {digest of shown offsets: the motion before them}} of this file's jobs."""
+    """{session_uid: {digest of previewed offsets: the motion before them}} of this file's jobs."""
 
     def note(self, source, shown, before):
         self.setdefault(source.session_uid, {})[digest(shown)] = before
 
     def recover(self):
-        """After a step was undone or redone: puts back what a solve has moved in it."""
-        # A list: restoring removes helper objects, at which Blender's own iterator may stand.
+        """After undo or redo: restores the motion of sources whose step contains a preview."""
+        # A list: restoring removes helper objects, which may invalidate Blender's iterator.
         for source in [item for item in bpy.data.objects if item.session_uid in self]:
             known = self[source.session_uid]
             shown = motion.snapshot(source) if source.mode != "EDIT" else None
@@ -65,18 +65,18 @@ class FirstResult:
             local = self._surface.space.to_local(points.astype(float))
             motion.write(source, motion.Motion(local - self._surface.local))
             steps.note(source, motion.snapshot(source), self._before)
-        except UserError:  # the mesh is another one by now: the job itself will tell
+        except UserError:  # the mesh has changed: the job reports it
             self.clear()
 
     def clear(self):
-        """Puts back what was there before."""
+        """Restores the motion from before the preview."""
         if self._shown:
             self._shown = False
             put_back(self._surface.reference, self._before)
 
 
 def put_back(reference, before):
-    """Gives the source that motion, as soon as Edit Mode is left."""
+    """Restores the motion `before` as soon as the source is not in Edit Mode."""
 
     def attempt():
         source = reference.find()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What deforming and stylizing share: a field is solved on the worker, then moves a mesh."""
+"""Base of the Deform and Stylize jobs: solves a field on the worker, then moves a mesh by it."""
 
 import math
 
@@ -33,7 +33,7 @@ from .first_result import FirstResult
 def plan_solve_job(context, operator, source, kind, samples, seed, solve, places=False):
     """The job's item. `solve(tracker, surface, samples, weight)` returns the field, on the worker.
 
-    `places`: the object itself takes what of the result is a similarity; the mesh takes the rest.
+    `places`: the object's transform takes the similarity part of the result, the mesh the rest.
     """
     settings = settings_of(source)
     output, result = destination(settings, operator)
@@ -56,7 +56,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
     def work(tracker):
         if preview is not None:
             tracker.rest_preview_points = preview.points
-        weight = 1.0 if output == "WARP" else 0.7  # of the solve in what is left to do
+        weight = 1.0 if output == "WARP" else 0.7  # share of the solve in the remaining work
         points = surface.samples(tracker, samples, seed, own_triangles=surface.exact and output == "WARP")
         field = solve(tracker, surface, points, weight)
         topology, report = None, {"output": output, **field.report.to_dict()}
@@ -111,15 +111,15 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
 
 
 class SolveOperator(JobOperator):
-    """Mixin of the jobs that solve for a field: what they cannot place is refused before the work."""
+    """Mixin of jobs that solve a field; refuses results that cannot be placed before the solve."""
 
-    ended_live = False  # whether live mode gave way to it
+    ended_live = False  # whether the operator has ended live mode
 
-    gone = ()  # (ObjectReference, what make_way() has taken away) of sources that have no result yet
+    gone = ()  # (ObjectReference, motions removed by make_way()) of sources without a result yet
 
     @classmethod
     def refuses(cls, source):
-        """Checked before the button is pressed; a script's own arguments are checked when it calls."""
+        """Checks the settings in the user interface only; a script's arguments are checked in `plan`."""
         return placement_refusal(source) if has_window() else None
 
     def keep_undo_true(self):
@@ -127,7 +127,7 @@ class SolveOperator(JobOperator):
             bpy.ops.ed.undo_push(message="Live")
 
     def end_live(self, context, source, kind):
-        """For when nothing is refused any more; what such a run acts on becomes a layer."""
+        """Ends live mode after all checks, and makes the result that the run acts on a layer."""
         output, result = destination(settings_of(source), self)
         self.ended_live |= end_for_job(context, source, output, result)
         if any(reference.uid == source.session_uid for reference, _ in self.gone):
@@ -137,7 +137,7 @@ class SolveOperator(JobOperator):
         self.gone = (*self.gone, (ObjectReference(source), layers.make_way(source, kind)))
 
     def clear_up(self, job):
-        """Where nothing came of it, the results before lie as they did."""
+        """Restores the earlier results of sources whose job has failed."""
         for reference, gone in self.gone:
             source = reference.find()
             if source is not None:
@@ -148,13 +148,13 @@ class SolveOperator(JobOperator):
 
 
 def of_own_handles(report, count):
-    """The error of so many handles that come first; what pins keep at rest, which follows, is none."""
+    """{"handle_error_max"} of the first `count` handles: the FAR handle, which comes last, does not count."""
     errors = [handle["error_max"] for handle in report.get("handles", ())][:count]
     return {"handle_error_max": max(errors)} if errors else {}
 
 
 def describe(shown, report, size):
-    """What a solve of an object of that size has reached, in one line; `shown` is its result, if another."""
+    """One line on a solve's quality, for an object of that size; `shown`: names of affected objects."""
     figures = [shown] if shown else []
     if report.get("handle_error_max"):
         share = max(0.001, math.ceil(1000 * report["handle_error_max"] / size) / 1000)

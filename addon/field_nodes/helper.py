@@ -73,14 +73,14 @@ def columns_of(matrix):
 
 
 def matrix_of(field, local_to_solve):
-    """(4, 4) the field's cube → local coordinates of its source."""
+    """(4, 4) the field's unit cube → local coordinates of its source."""
     to_solve = np.diag([*[field.frame.scale] * 3, 1.0])
     to_solve[:3, 3] = field.frame.center
     return inverse(local_to_solve) @ to_solve
 
 
 def of(source):
-    """The source's own helper, or None; a copy of an object names that of the original."""
+    """The source's own helper, or None; a duplicate's property points to the original's helper."""
     helper = settings_of(source).field_helper
     return helper if helper is not None and helper.parent == source and helper.library is None else None
 
@@ -122,7 +122,7 @@ def read(helper):
 
 
 def clear(source):
-    """Its field moves nothing more."""
+    """Empties the source's helper, so that followers do not move."""
     if of(source) is not None:
         write(of(source), np.zeros((0, 27)))
 

@@ -11,8 +11,8 @@ from ..names import FIELD_NODES
 from .rows import INSIDE, MAP, MOVE, SCALE, Nodes, Rows
 
 VERSION = 1
-STEP = 0.01  # of the cube's half side: apart by so much, places tell how an instance turns
-TURNS = 6  # steps towards the closest rotation: each about squares what is missing
+STEP = 0.01  # step of finite differences for instance rotations, in half cube sides
+TURNS = 6  # Newton iterations to the closest rotation: quadratic convergence
 
 
 def find_or_make():
@@ -117,7 +117,7 @@ def embedding(graph, nodes, place):
 
 
 def turn_instances(graph, before, count, after, acts, strength, shift, space):
-    """Turns instances by the rotation closest to f's slope, from differences of places beside each."""
+    """Rotates instances by the rotation closest to f's Jacobian, by finite differences."""
     position = graph.node("GeometryNodeInputPosition").outputs[0]
     step = graph.node("FunctionNodeTransformDirection", (STEP, 0.0, 0.0), space).outputs[0]
     step = graph.vector("LENGTH", step)
@@ -163,7 +163,7 @@ def turn_instances(graph, before, count, after, acts, strength, shift, space):
 
 
 def move_handles(graph, curves, after, acts, strength, shift):
-    """Puts the handles of Bézier curves where f takes them; automatic ones follow from the points."""
+    """Moves free and aligned handles of Bézier curves by f; automatic ones follow from the points."""
     count, index = graph.size(curves, "CURVE"), graph.node("GeometryNodeInputIndex").outputs[0]
     places = graph.node("GeometryNodeInputCurveHandlePositions").outputs
     for side, place in zip(("LEFT", "RIGHT"), places, strict=True):

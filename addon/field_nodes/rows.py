@@ -40,7 +40,7 @@ class Nodes(Graph):
         return self.node("GeometryNodeInputNamedAttribute", name, data_type=data_type).outputs[0]
 
     def moved_points(self, count, place, shift):
-        """Points there that know how far the field takes each."""
+        """Points at `place` with their displacement `shift` as an attribute."""
         points = self.node("GeometryNodePoints", count, place).outputs[0]
         into = {"Name": MOVE, "Value": shift}
         return self.node(
@@ -51,7 +51,7 @@ class Nodes(Graph):
         return self.sample(points, self.attribute(MOVE, "FLOAT_VECTOR"), index, "FLOAT_VECTOR")
 
     def repeat(self, count, start, add):
-        """Values after so many times add(index, values); `start` has their types and the first ones."""
+        """Repeat zone: values after `count` calls of add(index, values); `start`: [(type, first value)]."""
         first, last = (self.node(f"GeometryNodeRepeat{way}") for way in ("Input", "Output"))
         first.pair_with_output(last)
         last.repeat_items.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One drag of a handle, from the press to the release: live, and taken back bit for bit where cancelled."""
+"""One live drag of a handle, from press to release; cancelling restores everything bit for bit."""
 
 from mathutils import Matrix, Vector
 
@@ -11,15 +11,15 @@ from ..field_modifier import layers, motion
 from ..live import sessions, stored
 from . import pins
 
-SHAPE_WAIT = 0.25  # seconds at most that a redraw waits for its shape
+SHAPE_WAIT = 0.25  # most seconds that a redraw waits for the shape
 TRANSFORMS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 
 
 class Snapshot:
-    """What a drag changes, as it was: begun before the pin is placed."""
+    """The state that a drag changes, read before the pin is placed."""
 
     def __init__(self, context, source, ended=None):
-        self.ended = ended  # as make_way() gives it
+        self.ended = ended  # result of make_way()
         settings, layer = settings_of(source), context.view_layer
         self.source, session = ObjectReference(source), sessions.live.get(source.session_uid)
         self.live = None if session is None else (session.kind, session.keeps_shape)
@@ -31,7 +31,7 @@ class Snapshot:
         self.selected = [ObjectReference(item) for item in context.selected_objects]
 
     def restore_selection(self, context):
-        """Selects what was selected."""
+        """Restores the selection and the active object."""
         for item in context.selected_objects:
             item.select_set(False)
         for reference in self.selected:
@@ -41,7 +41,7 @@ class Snapshot:
         context.view_layer.objects.active = self.active.find() if self.active else None
 
     def restore_shape(self, context, is_held):
-        """Makes the shape what it was; the solver follows. `is_held`: it stays until a handle moves."""
+        """Restores the shape and informs the session. `is_held`: it stays until a handle moves."""
         source = self.source.get()
         if self.motion is None:
             modifier = modifier_stack.find(source)
@@ -49,13 +49,13 @@ class Snapshot:
         else:
             motion.restore(source, self.motion)
         stored.put_mark(source, self.mark)
-        if sessions.is_live(source):  # else it ended with an error, which the panel tells
+        if sessions.is_live(source):  # else it has ended with an error, shown in the panel
             sessions.live[source.session_uid].restored(is_held)
             sessions.update(context)
 
 
 class Drag:
-    """A handle's Empty under way. `is_new`: the pin was placed by this very press."""
+    """A drag of a handle's Empty. `is_new`: the pin was placed by the same press."""
 
     def __init__(self, context, before, empty, is_new=False):
         self.before, self.is_new, self.has_moved = before, is_new, False
@@ -67,13 +67,13 @@ class Drag:
         sessions.live[source.session_uid].keeps_shape = True
 
     def move(self, context, location):
-        """Takes the Empty to a location (3,) in world space."""
+        """Moves the Empty to a location (3,) in world space."""
         matrix = self.empty.get().matrix_world.copy()
         matrix.translation = Vector(location)
         self.put(context, matrix)
 
     def turn(self, context, axis, angle):
-        """Turns the Empty from where it was at the start, about an axis (3,) through it."""
+        """Rotates the Empty from its orientation at the start, about an axis (3,) through it."""
         entry = pins.entry_of(self.empty.get())
         if not entry.hold_turn:
             entry.hold_turn = True
@@ -83,7 +83,7 @@ class Drag:
         self.put(context, turn @ Matrix.Translation(-middle) @ self.start)
 
     def put(self, context, matrix):
-        """Moves the Empty, and the shape in the same picture where that is done in a moment."""
+        """Moves the Empty, and waits up to SHAPE_WAIT for the shape, to draw both in the same frame."""
         session = self.session()
         self.empty.get().matrix_world = matrix
         sessions.update(context)
@@ -93,7 +93,7 @@ class Drag:
         self.has_moved = True
 
     def change_reach(self, context, steps):
-        """Has the handle reach so many steps of the wheel farther, or less far where these are negative."""
+        """Increases the handle's reach by steps of the mouse wheel; negative ones decrease it."""
         entry = pins.entry_of(self.empty.get())
         entry.reach = pins.next_reach(self.before.source.get(), entry, steps)
         self.has_moved = True
@@ -103,12 +103,12 @@ class Drag:
         return sessions.live.get(self.before.source.uid)
 
     def is_settled(self):
-        """Whether the shape has reached the handle, and is as good as it gets."""
+        """Whether the session has solved and refined the newest request."""
         session = self.session()
         return session is None or (session.worker is not None and session.worker.is_settled)
 
     def end(self, context):
-        """What is shown now stays; a press without a move changes no shape."""
+        """Keeps the shape on display; a press without a move does not change it."""
         session = self.session()
         if not self.has_moved:
             self.before.restore_shape(context, is_held=self.before.is_settled)
@@ -117,7 +117,7 @@ class Drag:
             insert_keys(context, self.empty.get())
 
     def cancel(self, context):
-        """All is as it was before the press, bit for bit."""
+        """Restores the state before the press, bit for bit."""
         source, empty = self.before.source.get(), self.empty.find()
         if self.is_new and empty is not None:
             pins.discard(source, empty)
@@ -142,7 +142,7 @@ class Drag:
 
 
 def insert_keys(context, empty):
-    """Keys the handle where Blender's automatic keys are on."""
+    """Keyframes the handle if Auto Keying is on."""
     if context.scene.tool_settings.use_keyframe_insert_auto:
         turn = {"QUATERNION": "quaternion", "AXIS_ANGLE": "axis_angle"}.get(empty.rotation_mode, "euler")
         for path in ("location", f"rotation_{turn}"):
@@ -156,13 +156,13 @@ def begin_live(context, source):
 
 
 def kind_of(source):
-    """What a drag makes a source live as: where its style holds handles, the style goes on."""
+    """The kind of session for a drag: STYLIZE if the source's motion is a style with handles."""
     posed = settings_of(source).moved_by == layers.POSED and settings_of(source).stylize.use_handles
     return "STYLIZE" if posed else "DEFORM"
 
 
 def make_way(context, source):
-    """Before a drag: it acts on the shape that is seen. Returns what live mode gave way to it, or None."""
+    """layers.make_way() before a drag. Returns (Former, kind) of a session that it has ended, or None."""
     ended = None
     if not sessions.follows_handles(source):
         ended = sessions.end_for_kind(context, source, kind_of(source))

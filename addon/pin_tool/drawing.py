@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the pin tool draws: its pins, the active one's ring, and the surface under the cursor.
+"""Drawing of the pin tool: pins, the active one's ring, and the surface under the cursor.
 
-With symmetry, faint discs where the other side is pinned as well.
+With symmetry, also faint discs at the mirrored pins.
 """
 
 import bpy
@@ -34,9 +34,9 @@ ANCHOR_STROKES = (  # of a square from -1 to 1
     np.stack([0.6 * np.cos(ARMS), 0.55 * np.sin(ARMS) - 0.1], axis=1),
     0.17 * np.concatenate([CIRCLE, CIRCLE[:1]]) + (0, 0.6),
 )
-ENOUGH = 8  # triangles within the radius that show it; a disc does where they are fewer
-GHOST = 0.35  # how much of a disc is left on the other side
-LIFT = 1.5  # pixels by which the lit surface is drawn before the shape
+ENOUGH = 8  # least number of highlighted triangles; with fewer, a disc is drawn
+GHOST = 0.35  # opacity of mirrored discs
+LIFT = 1.5  # offset of the highlight towards the viewer, in pixels
 
 
 def is_active(context):
@@ -62,7 +62,7 @@ class Brush:
         return screen.pixel_size(self.perspective, self.size, location)
 
     def outline(self, location, shape, pixels):
-        """(n, 3) corners of a shape, (n, 2), so many pixels large."""
+        """(n, 3) world corners of a shape, (n, 2), with a radius of `pixels`."""
         length = pixels * self.scale * self.pixel(location)
         return location + length * (shape[:, :1] * self.right + shape[:, 1:] * self.up)
 
@@ -105,7 +105,7 @@ def draw():
 
 
 def ghosts(handles):
-    """((r, g, b), shape, (3,) location) of these [(source, entry)] where Symmetry mirrors them to."""
+    """((r, g, b), shape, (3,) location) of the mirror images of these [(source, entry)] by Symmetry."""
     mirrored = []
     for source, entry in handles:
         mirror, now = symmetry.mirror_of(source), movers.box_now(entry)
@@ -130,7 +130,7 @@ def draw_surface(brush, target):
 
 
 def draw_kept(brush, source):
-    """About each pin that is no anchor the circle beyond which the rest is kept, at rest."""
+    """Draws a circle around the rest location of each pin that is no anchor: points beyond all stay."""
     places, beyond = empties.kept_rest(source)
     world = movers.matrix_of(source)
     radius = beyond * np.cbrt(abs(np.linalg.det(world[:3, :3])))
@@ -139,9 +139,9 @@ def draw_kept(brush, source):
 
 
 def draw_handle(brush, entry, target, is_chosen):
-    """A disc, with a hole where it holds its place alone; for an anchor a square with one on it.
+    """Draws a disc, with a hole if it holds its location only; a square with an anchor symbol for an anchor.
 
-    Larger under the cursor; the chosen one has a ring to turn it by.
+    It is larger under the cursor; the active one has a ring to rotate it.
     """
     location = np.array(entry.empty.matrix_world.translation)
     meant = target is not None and target.empty is not None and target.empty.uid == entry.empty.session_uid

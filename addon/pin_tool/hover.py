@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What lies under the cursor: a handle, the active handle's ring, a surface; and what of it lights up."""
+"""The target under the cursor: a handle, the active handle's ring, or a surface with its highlight."""
 
 from dataclasses import dataclass
 
@@ -14,8 +14,8 @@ from ..field_modifier import motion
 from ..handles.empties import matrix_of
 from . import pins, screen
 
-REACH = 14  # pixels within which a handle is met, at a scale of 1
-SPLAT_REACH = 6  # pixels within which a splat is met, at a scale of 1
+REACH = 14  # picking radius of a handle in pixels, at UI scale 1
+SPLAT_REACH = 6  # picking radius of a splat in pixels, at UI scale 1
 RING, RING_REACH = (
     46,
     7,
@@ -32,13 +32,13 @@ class Target:
     location: np.ndarray | None = None  # (3,) on the surface, in world space
     normal: np.ndarray | None = None
     radius: float = 0.0  # in the world, of the region that a pin there would hold
-    face: int = -1  # of the mesh as shown, which has `face_count` of them
+    face: int = -1  # index in the evaluated mesh, which has `face_count` faces
     face_count: int = 0
     lit: np.ndarray | None = None  # (k, 3, 3) triangles within the radius, in world space
 
 
 class Hover:
-    """The target under the cursor when the mouse last moved, and whether a drag goes on."""
+    """The target at the last mouse move, and whether a drag is running."""
 
     def __init__(self):
         self.clear()
@@ -68,7 +68,7 @@ class View:
         )
 
     def beside(self, location, offset=(0, 0)):
-        """The point as deep as a location, under the cursor and so many pixels beside it."""
+        """The world location at the depth of `location`, under the cursor plus an offset in pixels."""
         pixel = np.add(self.pixel, offset)
         return view3d_utils.region_2d_to_location_3d(self.region, self.view, pixel, location)
 
@@ -82,9 +82,9 @@ class View:
 
 
 def under(context, view, lights=False):
-    """The Target under the cursor, or None. Handles come first, behind or before the mesh.
+    """The Target under the cursor, or None. Handles take precedence, even behind the mesh.
 
-    `lights`: also what of a surface lights up, which takes a while on a large mesh.
+    `lights`: also finds the triangles to highlight, which is slow on a large mesh.
     """
     handles = pins.handles_in_view(context)
     spots = screen.project(
@@ -105,7 +105,7 @@ def under(context, view, lights=False):
 
 
 def surface(context, view, lights):
-    """The Target of the first surface along the line of sight; None where that is no mesh to pin."""
+    """The Target of the first surface along the line of sight; None if it cannot be pinned."""
     depsgraph = context.evaluated_depsgraph_get()
     met, location, normal, face, item, matrix = context.scene.ray_cast(depsgraph, *view.ray())
     splat = splat_under(context, view)
@@ -162,7 +162,7 @@ def splat_under(context, view):
 def lit(mesh, world, location, radius):
     """(k, 3, 3) the triangles of a mesh with a corner within the radius of the location, in world space."""
     points = mesh_arrays.positions(mesh).astype(np.float32)
-    least = np.linalg.svd(world[:3, :3], compute_uv=False).min()  # local lengths are so much shorter
+    least = np.linalg.svd(world[:3, :3], compute_uv=False).min()  # smallest world length per local one
     middle = transform(inverse(world), location[None])[0]
     kept = ((points - middle.astype(np.float32)) ** 2).sum(axis=1) <= (radius / least) ** 2
     corners = mesh_arrays.triangles(mesh)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the pin tool's operators share: where they work, and the modal drag from the press to the rest."""
+"""Mixins of the pin tool's operators: their poll, and the modal drag from press to settled shape."""
 
 import numpy as np
 
@@ -12,12 +12,12 @@ from ..live import sessions
 from . import screen
 from .hover import View, hover
 
-TICK = 0.05  # seconds between looks at a shape that comes to rest
-NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD")  # types of events that turn the view
+TICK = 0.05  # seconds between timer events while the shape settles
+NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NDOF", "NUMPAD")  # event types of view navigation
 
 
 def reach_steps(event):
-    """By how many steps an event has a handle reach farther; the keys are those of proportional editing."""
+    """Steps by which an event increases a handle's reach; the keys are those of proportional editing."""
     if event.value != "PRESS":
         return 0
     if event.type in ("PAGE_UP", "PAGE_DOWN"):
@@ -55,7 +55,7 @@ class Dragging(PinOperator):
         return {"RUNNING_MODAL"}
 
     def grab(self, view, pixel):
-        """The handle is held where it is now, by that pixel, as the view is now."""
+        """Starts or restarts the drag from the handle's present location, the pixel and the present view."""
         matrix = self.drag.empty.get().matrix_world
         spot = view.pixel_of(matrix.translation)
         self.grab_offset, self.grab_point = np.subtract(spot, pixel), matrix.translation.copy()
@@ -63,7 +63,7 @@ class Dragging(PinOperator):
         self.last = pixel
 
     def modal(self, context, event):
-        if hover.drag is not self.drag:  # taken away from outside: a file is loaded, a step undone
+        if hover.drag is not self.drag:  # cleared by loading a file or by undo
             return self.leave(context, {"CANCELLED"})
         try:
             return self.settle(context, event) if self.timer else self.follow(context, event)
@@ -96,7 +96,7 @@ class Dragging(PinOperator):
             self.moved(context, View(context, event))
         return {"RUNNING_MODAL"}
 
-    turned = False  # whether the view was, since the mouse moved
+    turned = False  # whether the view has changed since the last mouse move
 
     def moved(self, context, view):
         if self.turned:
@@ -112,7 +112,7 @@ class Dragging(PinOperator):
             self.drag.move(context, view.beside(self.grab_point, self.grab_offset))
 
     def settle(self, context, event):
-        """The button is up: the shape comes to rest, or until the user goes on."""
+        """After the release: runs until the shape has settled, or until the next user event."""
         if event.type == "TIMER":
             sessions.update(context)
             return self.end(context, {"FINISHED"}) if self.drag.is_settled() else {"RUNNING_MODAL"}

@@ -15,7 +15,7 @@ from .modal import Dragging, PinOperator
 
 
 def source_of_target(target):
-    """The object under the cursor; UserError where it cannot be pinned."""
+    """The object under the cursor; UserError if it cannot be pinned."""
     source = target.source.get()
     if target.kind == "REFUSED":
         raise pins.refusal(source)
@@ -23,7 +23,7 @@ def source_of_target(target):
 
 
 def drag_of_new_pin(context, source, target, **further):
-    """The drag of a pin that is placed where the cursor is on the surface."""
+    """Places a pin on the surface under the cursor and starts its Drag."""
     where = {"face": target.face, "face_count": target.face_count}
     return drag.of_new_pin(context, source, target.location, target.radius, **where, **further)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pins: handles whose Empties stand on the surface, each of which holds a small round region of it."""
+"""Pins: handles with an Empty on the surface, each of which holds a small round region of it."""
 
 import bpy
 import numpy as np
@@ -20,13 +20,13 @@ from ..live import sessions
 from ..results import placement
 from . import places
 
-REACH_STEP = 1.1  # how many times as far a handle reaches by one step of the wheel
-KEPT = 0.3  # of the shape's size beyond which the rest is kept, at first
-MAJORITY = 0.5  # mean weight from which a vertex group gives a pin its name
+REACH_STEP = 1.1  # factor of a handle's reach per step of the mouse wheel
+KEPT = 0.3  # default distance beyond which points stay in place, as a share of the shape's size
+MAJORITY = 0.5  # least mean weight of a vertex group that names a pin
 
 
 def refusal(item):
-    """Why an object cannot be pinned, as a UserError; None where it can."""
+    """UserError that says why an object cannot be pinned; else None."""
     error = object_references.refusal(item)
     if error is None and item.library is not None:
         error = UserError("{name} is linked from another file; make it local to give it handles", item)
@@ -42,12 +42,12 @@ def refusal(item):
 
 
 def is_own(item):
-    """Whether it is a source of the user's own, no result of ours."""
+    """Whether an object is a source, and no result of another one."""
     return object_references.is_source(item) and owner_of(item) is None
 
 
 def handles_in_view(context):
-    """[(source, entry)] of all handles that are seen."""
+    """[(source, entry)] of all visible handles with Empties."""
     handles = []
     for source in context.view_layer.objects:
         if settings_of(source).handles and object_references.is_source(source):
@@ -57,7 +57,7 @@ def handles_in_view(context):
 
 
 def chosen(context):
-    """The Empty of the active handle, where it is selected too; or None."""
+    """The active object if it is selected and a handle's Empty; else None."""
     active = context.view_layer.objects.active
     is_handle = active is not None and active.type == "EMPTY" and active.select_get()
     return active if is_handle and entry_of(active) is not None else None
@@ -71,10 +71,10 @@ def entry_of(empty):
 
 
 def next_reach(source, entry, steps):
-    """How far a handle reaches after so many steps of the wheel, in the object's lengths.
+    """A handle's reach after that many steps of the mouse wheel, in the object's units.
 
-    Not less than its own size; beyond the object's size it reaches everything, which is 0, and from there one
-    step back is that size.
+    At least the handle's own size; beyond the object's size it is 0, which means unlimited, and one step
+    back from there is the object's size.
     """
     size = float(np.linalg.norm(np.ptp(np.array(source.bound_box), axis=0)))
     rest = np.array(entry.rest, dtype=np.float64).reshape(4, 4)
@@ -86,7 +86,7 @@ def next_reach(source, entry, steps):
 def place(context, source, location, radius, face=None, face_count=None, anchor=False, kind="PIN"):
     """A pin at a location on the shown surface, (3,) in world space; returns its handle.
 
-    Where the surface is deformed the pin is at rest where that place was, so that nothing moves.
+    On a deformed surface the pin's rest pose is at that point of the rest shape, so that nothing moves.
     """
     error = refusal(source)
     if error is not None:
@@ -109,7 +109,7 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
 
 
 def warn_of_moves(source):
-    """Says that a later modifier moves the shape that was clicked."""
+    """Warns that a modifier after the field moves the clicked surface."""
     later = list(source.modifiers)[modifier_stack.place(source) + 1 :]
     moving = [one for one in later if one.show_viewport and one.type not in modifier_stack.REFINING]
     if moving:
@@ -122,7 +122,7 @@ def warn_of_moves(source):
 
 
 def hold_turn(entry, holds):
-    """Makes a pin hold its turn as well, as the surface is turned now, or its place alone."""
+    """Switches a pin between holding location and the surface's present rotation, and location only."""
     if entry.kind not in empties.PINS or holds == (entry.kind == "PIN"):
         return
     source, empty = entry.id_data, entry.empty
@@ -139,7 +139,7 @@ listeners["hold_turn"] = hold_turn
 
 
 def name(source, weights):
-    """The vertex group that holds most of the place, or a number that no object has."""
+    """A pin's name: the vertex group with most weight there, else an unused numbered name."""
     best = max(weights, key=weights.get, default=None)
     if best is not None and weights[best] >= MAJORITY:
         return naming.name_of_group(best)
@@ -147,7 +147,7 @@ def name(source, weights):
 
 
 def select(context, empty):
-    """Makes this Empty the only one that is selected, its row the active one; whether it was not so yet."""
+    """Selects this Empty alone and makes its row active; returns whether that changed anything."""
     layer, source = context.view_layer, owner_of(empty)
     index = empties.find(source, empty)
     others = [item for item in context.selected_objects if item != empty]
@@ -167,7 +167,7 @@ def discard(source, empty):
 
 
 def remove(context, source, empty):
-    """Deletes a handle with its Empty; with the last one the motion goes too."""
+    """Deletes a handle with its Empty; with the last one, also removes the motion."""
     discard(source, empty)
     left = empties.used(source)
     if left:

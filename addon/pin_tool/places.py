@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a place on the shown surface back to the rest shape: where it rests, and how it has turned since.
+"""Maps a point on the deformed surface to the rest shape, with the surface's rotation there.
 
-The field's modifier only moves points, so that faces and their corners before and after it are the same.
+The field's modifier only moves points, so that the faces before and after it are the same.
 """
 
 from dataclasses import dataclass
@@ -15,17 +15,17 @@ from ..core.geometry.rotations import best_rotation
 from ..core.geometry.spaces import transform
 from ..handles.empties import matrix_of
 
-CANDIDATES = 64  # triangles that are looked at where the face is not known
-LEAST = 12  # points from which the turn of a place is measured, at least
+CANDIDATES = 64  # number of triangles to search if the face is unknown
+LEAST = 12  # least number of points to measure the rotation
 
 
 @dataclass(frozen=True)
 class Place:
     rest: np.ndarray  # (3,) in world space, of the shape before the field
-    now: np.ndarray  # (3,) where the field has it
-    turn: np.ndarray  # (3, 3) the rotation of the surface about it from rest
-    size: float  # of the shape at rest, in the object's lengths
-    weights: dict  # mean weight of the points about it in each vertex group, by name
+    now: np.ndarray  # (3,) in world space, after the field
+    turn: np.ndarray  # (3, 3) rotation of the surface there since rest
+    size: float  # of the shape at rest, in the object's units
+    weights: dict  # {vertex group: mean weight of the points around it}
 
 
 def find(context, source, location, radius, face=None, face_count=None):
@@ -58,14 +58,14 @@ def find(context, source, location, radius, face=None, face_count=None):
 
 
 def near(points, triangles, location):
-    """The triangles whose middles are nearest to the location."""
+    """The CANDIDATES triangles whose centers are nearest to the location."""
     away = ((points[triangles].mean(axis=1) - location) ** 2).sum(axis=1)
     count = min(CANDIDATES, len(away))
     return triangles[np.argpartition(away, count - 1)[:count]]
 
 
 def map_back(now, rest, triangles, location):
-    """((3,) the place at rest of the point of these triangles nearest to the location, (3,) that point)."""
+    """((3,) rest position, (3,) position) of the point on these triangles nearest to the location."""
     best, nearest, triangle = np.inf, Vector(location), triangles[0]
     for corners in triangles:
         point = closest_point_on_tri(Vector(location), *(Vector(now[i]) for i in corners))
@@ -74,21 +74,21 @@ def map_back(now, rest, triangles, location):
             best, nearest, triangle = away, point, corners
     ends = [Vector(now[i]) for i in triangle], [Vector(rest[i]) for i in triangle]
     mapped = np.array(barycentric_transform(nearest, *ends[0], *ends[1]))
-    if not np.isfinite(mapped).all():  # the triangle has no area
+    if not np.isfinite(mapped).all():  # a degenerate triangle
         closest = triangle[np.linalg.norm(now[triangle] - nearest, axis=1).argmin()]
         mapped = rest[closest]
     return mapped, np.array(nearest)
 
 
 def around(rest, place, radius):
-    """Indices of the points within the radius, and of some nearest ones where these are few."""
+    """Indices of the points within the radius, or of the LEAST nearest ones if these are fewer."""
     away = np.linalg.norm(rest - place, axis=1)
     count = max(int((away <= radius).sum()), min(LEAST, len(rest)))
     return np.argpartition(away, count - 1)[:count]
 
 
 def group_weights(source, mesh, indices):
-    """{name: mean weight of these points of the mesh in that vertex group}."""
+    """{vertex group: mean weight of these points of the mesh}."""
     names = {group.index: group.name for group in source.vertex_groups}
     sums = dict.fromkeys(names.values(), 0.0)
     for index in indices.tolist() if names else ():

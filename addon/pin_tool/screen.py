@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points on the screen: pixels from the left and the bottom of a region, by its perspective matrix."""
+"""Projection to region pixels, from the bottom left, by the view's perspective matrix."""
 
 import numpy as np
 
 
 def project(perspective, size, points):
-    """(n, 2) pixels of (n, 3) points in world space, NaN for those behind the eye.
+    """(n, 2) pixels of (n, 3) points in world space, NaN for points behind the viewer.
+
 
     `perspective` is the (4, 4) matrix of the view (world → clip space), `size` the region's width and height.
     """
@@ -17,14 +18,14 @@ def project(perspective, size, points):
 
 
 def pixel_size(perspective, size, point):
-    """How long a pixel is in the world at a point (3,) there."""
+    """World length of a pixel at the depth of a point (3,)."""
     perspective = np.asarray(perspective, dtype=np.float64)
     depth = perspective[3, :3] @ np.asarray(point, dtype=np.float64) + perspective[3, 3]
     return abs(depth) / (np.linalg.norm(perspective[0, :3]) * size[0] / 2)
 
 
 def nearest(places, pixel, reach):
-    """Index of the (n, 2) place nearest to a pixel, or -1 where none is within `reach` pixels."""
+    """Index of the (n, 2) position nearest to a pixel, or -1 if none is within `reach` pixels."""
     if not len(places):
         return -1
     away = np.linalg.norm(np.asarray(places) - pixel, axis=1)
@@ -34,9 +35,9 @@ def nearest(places, pixel, reach):
 
 
 def foremost(perspective, size, points, towards, pixel, reach):
-    """Index of the point nearest to the viewer of those within `reach` of a pixel, or -1.
+    """Index of the foremost point among those within `reach` pixels of a pixel, or -1.
 
-    `perspective` is from the points' space to clip space, `towards` (3,) the way to the viewer in the former.
+    `perspective`: (4, 4) from the points' space to clip space, `towards`: (3,) direction to the viewer in it.
     """
     rows, size = np.asarray(perspective, dtype=np.float32)[[0, 1, 3]], np.asarray(size, dtype=np.float32)
     clip = points @ rows[:, :3].T + rows[:, 3]

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fields that are kept under a name, and applied to other meshes of the same shape."""
+"""Named fields, stored in the file and applied to other meshes of the same shape."""

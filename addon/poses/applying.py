@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A pose puts another mesh, and what that carries, where its field takes them."""
+"""Applies a pose's field to another mesh and its carried objects."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..core.runtime import native
 from ..field_modifier import layers, motion
 from ..live import sessions
 
-solved = {}  # session_uid of a source → the Pose of its last solve, until the file is left
+solved = {}  # {session_uid of a source: Pose of its last solve}, cleared when another file is loaded
 
 
 def solved_pose(context, source):
@@ -34,7 +34,7 @@ def solved_pose(context, source):
 
 
 def apply(context, source, pose, strength):
-    """Moves the source's points by the pose's field, so much of the way; returns warnings."""
+    """Moves the source's points by the pose's field, scaled by `strength`; returns warnings."""
     reason = motion.refusal(source)
     if reason is None and settings_of(source).live_kind:
         reason = UserError("{name} is live; end live mode first", source)

@@ -18,7 +18,7 @@ def kept_poses(context):
 
 
 def chosen(context, name):
-    """The kept pose of that name, or the one chosen in the list; UserError where there is none."""
+    """The stored pose of that name, or the active one of the list; UserError without one."""
     kept = kept_poses(context)
     index = kept.find(name) if name else context.scene.arapfields.active_pose
     if not 0 <= index < len(kept):
@@ -27,7 +27,7 @@ def chosen(context, name):
 
 
 def keep(context, name, content):
-    """Puts a pose on the scene's list, in place of one of the same name."""
+    """Adds a pose to the scene's list, or replaces the one of the same name."""
     group = context.scene.arapfields
     entry = group.poses.get(name) or group.poses.add()
     entry.name, entry.data = name, poses.to_text(content)
@@ -42,14 +42,14 @@ def read(path):
 
 
 class PoseOperator(ReportingOperator):
-    """Mixin of all of them."""
+    """Mixin of all pose operators."""
 
     bl_options = {"REGISTER", "UNDO"}
     guide = "characters"
 
 
 class OfSource(PoseOperator, SourceOperator):
-    """Mixin of those that need a mesh."""
+    """Mixin of pose operators that need a source."""
 
 
 class ARAPFIELDS_OT_save_pose(OfSource, bpy.types.Operator):
@@ -90,7 +90,7 @@ class ARAPFIELDS_OT_apply_pose(OfSource, bpy.types.Operator):
 
 
 class OfPose(PoseOperator):
-    """Mixin of those that need a kept pose."""
+    """Mixin of pose operators that need a stored pose."""
 
     @classmethod
     def obstacle(cls, context):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One kept pose of a scene."""
+"""A stored pose of a scene."""
 
 import bpy
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The picture of an object's style: a ball whose normals are what the object asks of them."""
+"""Icon of an object as a style: a ball shaded with the style's preferred normals."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ NAME = "STYLE_OBJECT"
 
 
 def icon(item):
-    """The number of the picture of an object as a style; 0 where it can be none."""
+    """The icon_id of an object as a style; 0 if it cannot be one."""
     try:
         style, key = style_object.style_of(item)
     except (UserError, native.library().InvalidInput):
@@ -26,7 +26,7 @@ def icon(item):
 
 
 def picture(style):
-    """(SIZE, SIZE, 4) shares of red, green, blue and opacity, from below."""
+    """(SIZE, SIZE, 4) RGBA in 0 to 1, from the bottom row up."""
     view = VIEW / np.linalg.norm(VIEW, axis=1, keepdims=True)
     count = SIZE * FINER
     places = (np.arange(count) + 0.5) / count * 2.1 - 1.05

@@ -38,7 +38,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
 
     @classmethod
     def refuses(cls, source):
-        """As the settings ask; a script may ask for another style."""
+        """Checks the settings' style only in the user interface: a script may choose another one."""
         return super().refuses(source) or (style_settings.refusal(source) if has_window() else None)
 
     def groups_of(self, source):

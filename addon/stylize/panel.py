@@ -21,11 +21,11 @@ from ..results.placement import placement_refusal, replaced_by
 from ..solver import style_settings
 from . import ball
 
-PLAIN = {"AXES": "EMPTY_AXIS", "OBJECT": "MESH_MONKEY"}  # icons of styles that have no picture
+PLAIN = {"AXES": "EMPTY_AXIS", "OBJECT": "MESH_MONKEY"}  # icons of styles without an image
 
 
 def picture_of(identifier, chosen):
-    """A style's picture as keywords of a layout's call: of an object's, a ball that is styled by it."""
+    """A style's icon as keyword arguments of UILayout functions; for an object, a ball in its style."""
     number = icon(identifier)
     if identifier == "OBJECT" and chosen is not None:
         number = ball.icon(chosen)

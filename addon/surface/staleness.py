@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whose mesh or settings changed since its fit: seen from Blender's updates, without reading any mesh."""
+"""Tracks whether meshes or settings have changed since their fit, by depsgraph updates only."""
 
 import json
 
@@ -19,13 +19,13 @@ def options_text(settings):
 
 
 def mark_fitted(source, surface):
-    """Notes that this source has just been fitted."""
+    """Marks the source's fit as up to date."""
     changed.discard(source.session_uid)
     settings_of(source).fit_options = json.dumps(sorted(surface.fit.options.items()))
 
 
 def reason(source):
-    """Why the last fit is out of date, as a text to translate; empty where it is not known to be."""
+    """Text to translate that says why the last fit is out of date; "" if it is not known to be."""
     if source.session_uid in changed:
         return "The mesh changed since the fit"
     settings = settings_of(source)
@@ -33,7 +33,7 @@ def reason(source):
 
 
 def watch(depsgraph):
-    """Looks through what Blender has just updated."""
+    """Records the objects whose geometry a depsgraph has updated."""
     for update in depsgraph.updates:
         if update.is_updated_geometry and isinstance(update.id, bpy.types.Object):
             source = update.id.original

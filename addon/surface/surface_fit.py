@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The smooth surface that a network learns from a source's triangles, kept in a cache on disk."""
+"""The neural implicit surface fitted to a source's triangles, cached on disk."""
 
 from functools import cached_property
 
@@ -23,7 +23,7 @@ class SurfaceFit:
 
     @cached_property
     def key(self):
-        """Name of the fit in the cache; reading a large mesh takes a while, so workers ask for it."""
+        """Key of the fit in the cache; hashing a large mesh is slow, so only workers use it."""
         return fit_key(self.vertices, self.triangles, self.options, VERSION)
 
     @property
@@ -49,14 +49,14 @@ class SurfaceFit:
 
 
 def read_fit(settings, operator, vertices, triangles):
-    """The fit of a mesh as the settings ask for it; main thread."""
+    """The SurfaceFit of a mesh by the settings; main thread."""
     options = native_options("fit", fit_values(settings.fit, operator))
     machine, cache = user_preferences.machine_options(), user_preferences.fit_cache()
     return SurfaceFit(vertices, triangles, options, machine, cache)
 
 
 def fit_values(group, operator):
-    """The fit's settings that count; an operator's `quality` counts before single settings of the object."""
+    """The fit's effective settings; an operator's `quality` overrides the object's single settings."""
     values = effective_values(FIT, group, operator)
     if operator is not None and operator.properties.is_property_set("quality"):
         preset = QUALITIES[operator.quality][2]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handles in the viewport: the rest box of each, thin, and where it is now, thick; faint behind the mesh.
+"""Overlay of handles: each rest box with thin lines, the present box with thick ones; faint behind the mesh.
 
-Of a pin, whose Empty is a ball on the surface, the way that it has gone. About a selected handle, how far it
-reaches. With symmetry, ghosts of all on the other side.
+For a pin, whose Empty is a ball on the surface, a line from rest to its present location. Around a selected
+handle, its reach. With symmetry, mirror images of all handles.
 """
 
 import bpy
@@ -19,17 +19,17 @@ CORNERS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-
 EDGES = [(a, b) for a in range(8) for b in range(a) if (CORNERS[a] != CORNERS[b]).sum() == 1]
 ANGLES = np.linspace(0, 2 * np.pi, 48, endpoint=False)
 CIRCLE_ENDS = 2 * len(ANGLES)
-THIN, THICK, CHOSEN = 1.5, 2.5, 4.0  # widths of lines in pixels: at rest, now, of a selected handle
-HALO, HALO_ALPHA = 2.0, 0.55  # dark pixels around a line in all, which set it off from any mesh
-BEHIND = 0.3  # how much of a line is left behind what hides it
-GHOST = 0.35  # how much of a line is left on the other side
+THIN, THICK, CHOSEN = 1.5, 2.5, 4.0  # line widths in pixels: rest box, present box, selected handle
+HALO, HALO_ALPHA = 2.0, 0.55  # width in pixels and opacity of a line's dark outline
+BEHIND = 0.3  # opacity factor of hidden lines
+GHOST = 0.35  # opacity factor of mirrored lines
 NEARER = Matrix.Identity(4)  # a little towards the viewer, before the Empty's own lines
 NEARER[2][3] = -2e-4
 FLAT = np.eye(3)[:2]  # right and up of a viewer who looks along z
 
 
 def box_lines(matrix):
-    """The 24 ends of a box's edges, in world space."""
+    """The 24 end points of a box's edges, in world space."""
     corners = (CORNERS @ matrix.T)[:, :3]
     return [corners[end].tolist() for edge in EDGES for end in edge]
 
@@ -41,7 +41,7 @@ def circle_lines(center, radius, across):
 
 
 def shown_handles(source):
-    """(entry, its box at rest, its box now) of each handle whose Empty is seen, and of a chosen bone's."""
+    """Yields (entry, rest box, present box) of each handle with a visible Empty, and of the active bone's."""
     settings = settings_of(source)
     for index, entry in enumerate(settings.handles):
         if not movers.has_mover(entry) or not movers.mover_of(entry).visible_get():
@@ -63,7 +63,7 @@ def segments(source, across=FLAT):
 
 
 def outline(kind, rest, now, thick):
-    """[(width, line ends)] of a handle from its box at rest and now."""
+    """[(width, line ends)] of a handle by its rest box and its present box."""
     way = [rest[:3, 3].tolist(), now[:3, 3].tolist()]
     if kind in empties.PINS:
         return [] if np.allclose(*way, atol=1e-6) else [(thick, way)]
@@ -73,7 +73,7 @@ def outline(kind, rest, now, thick):
 
 
 def reach_lines(source, entry, rest, across):
-    """How far a handle reaches from where it rests: a larger box about a box, about others a circle."""
+    """Line ends of a handle's reach around its rest pose: a larger box for a box, else a circle."""
     halves = np.linalg.norm(rest[:3, :3], axis=0)
     length = entry.reach * np.cbrt(abs(np.linalg.det(movers.matrix_of(source)[:3, :3])))
     if entry.kind in ("CUBE", "BONE"):
@@ -85,9 +85,9 @@ def reach_lines(source, entry, rest, across):
 
 
 def ghosts(source, across=FLAT):
-    """((r, g, b), width, line ends in world space) of the handles on the other side, at rest and now.
+    """((r, g, b), width, line ends in world space) of mirrored handles, at rest and now.
 
-    None of those that stand on the plane itself.
+    Handles on the mirror plane are left out.
     """
     mirror = symmetry.mirror_of(source)
     if mirror is None:
@@ -110,7 +110,7 @@ def radius_of(box):
 
 
 def draw_lines(shader, colour, width, batch, strength=1.0):
-    """Lines with their halo, bright before what is shown and faint behind it."""
+    """Draws lines with their outline, faint where the scene hides them."""
     for test, alpha in (("GREATER", BEHIND * strength), ("LESS_EQUAL", strength)):
         gpu.state.depth_test_set(test)
         for shade, wide in (((0, 0, 0, HALO_ALPHA * alpha), width + HALO), ((*colour, alpha), width)):

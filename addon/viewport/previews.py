@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a running solve has so far, drawn over the viewport: nothing of it is ever in the file."""
+"""Previews of running solves, drawn as an overlay, never stored in the file."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ AMBIENT = 0.35
 
 
 class Shown:
-    """The one mesh that is drawn: `mesh` is (points in world space, normals, triangles), or None."""
+    """The mesh to draw: `mesh` is (points in world space, normals, triangles), or None."""
 
     def __init__(self):
         self.mesh = self.batch = None
@@ -27,14 +27,14 @@ shown = Shown()
 
 
 class Preview:
-    """A coarse mesh of the source in solve space; what is drawn is where its points go."""
+    """A coarse mesh of the source in solve space, drawn at its moved points."""
 
     def __init__(self, surface):
         self._surface, self._clustered = surface, None
 
     @property
     def points(self):
-        """(k, 3) points at rest; the worker asks for them, as a large mesh takes a while."""
+        """(k, 3) points at rest; called on the worker, as clustering a large mesh is slow."""
         if self._clustered is None:
             self._clustered = cluster_vertices(self._surface.vertices, self._surface.triangles)
         return self._clustered.vertices
@@ -50,7 +50,7 @@ class Preview:
 
 
 def batch_of(points, normals, triangles):
-    """The vertices with their shades, for the graphics card."""
+    """GPU batch of the vertices with shaded colours."""
     import gpu
 
     shade = AMBIENT + (1 - AMBIENT) * np.abs(normals @ LIGHT)
