@@ -140,6 +140,17 @@ def test_no_automatic_differentiation_in_native_code():
     assert not [name(p) for p in native if pattern.search(p.read_text())]
 
 
+def test_no_thread_local_object_has_a_destructor():
+    """Where threads end, MinGW frees such objects before it runs their destructors (GCC's bug 83562)."""
+    found = [
+        line
+        for path in sources(".cpp", ".h")
+        for line in re.findall(r"^ *(?:static )?thread_local (.*)", path.read_text(), flags=re.M)
+    ]
+    assert found
+    assert not [line for line in found if not re.match(r"(bool|int|double|const \w+\*) \w+ = ", line)]
+
+
 def test_bpy_stays_where_it_belongs():
     blender = {"bpy", "mathutils", "bl_ui"}
     places = [ROOT / "addon" / "core", ROOT / "native" / "python"]

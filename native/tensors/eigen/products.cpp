@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <stdexcept>
+#include <vector>
 
 #include "tensors/eigen/array.h"
 #include "tensors/eigen/product_kernel.h"
@@ -26,12 +28,42 @@ void with_real(const Tensor& tensor, Use&& use) {
     use(float());
 }
 
-/// Memory of the thread's own for the kernel.
+/// A buffer for the kernel, one for each product at a time; it is kept for later products. It is not
+/// thread_local: where threads end, MinGW frees such memory before it runs destructors (GCC's bug 83562).
 template <class Scalar>
-Scalar* product_memory() {
-  thread_local const Tensor memory = empty({product_buffer}, number_type<Scalar>);
-  return memory.data<Scalar>();
-}
+class ProductMemory {
+ public:
+  ProductMemory() {
+    Kept& kept = all();
+    // Not waited for: in a forked child nobody may be left to unlock it.
+    if (const std::unique_lock lock(kept.mutex, std::try_to_lock); lock && !kept.free.empty()) {
+      memory_ = kept.free.back();
+      kept.free.pop_back();
+    }
+    if (!memory_.defined()) memory_ = empty({product_buffer}, number_type<Scalar>);
+  }
+  ~ProductMemory() {
+    Kept& kept = all();
+    if (const std::unique_lock lock(kept.mutex, std::try_to_lock); lock && kept.free.size() < most_kept)
+      kept.free.push_back(memory_);
+  }
+  ProductMemory(const ProductMemory&) = delete;
+  ProductMemory& operator=(const ProductMemory&) = delete;
+  Scalar* data() const { return memory_.data<Scalar>(); }
+
+ private:
+  static constexpr std::size_t most_kept = 64;
+  struct Kept {
+    Kept() { free.reserve(most_kept); }
+    std::mutex mutex;
+    std::vector<Tensor> free;
+  };
+  static Kept& all() {
+    static Kept& kept = *new Kept;  // for good: threads may outlive static objects
+    return kept;
+  }
+  Tensor memory_;
+};
 
 void require_product(const Tensor& c, const Tensor& a, const Tensor& b) {
   if (a.dims() != 2 || b.dims() != 2 || c.size(0) != a.size(0) || a.size(1) != b.size(0) ||
@@ -90,6 +122,7 @@ void multiply(const Tensor& c, const Tensor& a, const Tensor& b, double factor, 
   if (a.count() == 0 && kept == 0.0) c.set_zero();
   with_real(c, [&](auto number) {
     using Scalar = decltype(number);
+    const ProductMemory<Scalar> memory;
     const ProductBlock<Scalar> block{strided<Scalar>(c),
                                      strided<const Scalar>(a),
                                      strided<const Scalar>(b),
@@ -98,7 +131,7 @@ void multiply(const Tensor& c, const Tensor& a, const Tensor& b, double factor, 
                                      b.size(1),
                                      static_cast<Scalar>(factor),
                                      kept != 0.0,
-                                     product_memory<Scalar>()};
+                                     memory.data()};
     ARAPFIELDS_DISPATCH(multiply_block(block));
   });
   if (c.type() == NumberType::bfloat16) round_bfloat16(c);
