@@ -87,7 +87,7 @@ class ARAPFIELDS_OT_wrap_sheet(JobOperator, bpy.types.Operator):
             try:
                 path.write_text(page, encoding="utf-8")
             except OSError as error:
-                self.add_message("ERROR", translated("{path}: {error}", path=path, error=error.strerror))
+                self.add_message("ERROR", translated(error))
                 return {"CANCELLED"}
             self.add_message("INFO", str(path))
         return result
