@@ -8,7 +8,7 @@ frame; rigid objects and bones get keyframes.
 
 import contextlib
 
-from ..blender import modifier_stack
+from ..blender import modifier_stack, references
 from ..blender.actions import key_at
 from ..blender.language import translated
 from ..carried import played_points
@@ -139,9 +139,10 @@ class CarriedBake:
         mesh = result_objects.shown_mesh(context, item, len(self.shapes[carried][0]), in_place=True)
         report = {"frames": self.frames.count}
         baked = result_objects.show(context, item, "BAKE", "BAKE", mesh, report, select=False)
-        result_objects.copy_modifiers(baked, modifier_stack.behind(item))
+        references.copy_modifiers(baked, modifier_stack.behind(item))
         source = self.carrying.source.get()
-        result_objects.retarget(baked, {source: result_objects.existing(context, source, "BAKE", "BAKE")})
+        own = {source: result_objects.existing(context, source, "BAKE", "BAKE")}
+        references.remap(references.parts_of(baked), own)
         yield from self.add_frames(carried, baked)
         visibility.show_alone(item, baked)
 

@@ -3,6 +3,8 @@
 
 import bpy
 
+from .references import put_at, references
+
 
 def remove_mesh_object(item):
     """Removes the object, its mesh, and the action of the mesh's shape keys."""
@@ -18,11 +20,9 @@ def remove_mesh_object(item):
 
 def remove_modifier(modifier):
     """Removes a modifier; clears its inputs first: Blender 5.2 would keep their data-blocks' users."""
-    inputs = getattr(getattr(modifier, "properties", None), "inputs", None)
-    for name in inputs.bl_rna.properties.keys() if inputs is not None else ():
-        slot = getattr(inputs, name)
-        if isinstance(getattr(slot, "value", None), bpy.types.ID):
-            slot.value = None
+    for path, _ in references(modifier):
+        if path.startswith("properties."):
+            put_at(modifier, path, None)
     modifier.id_data.modifiers.remove(modifier)
 
 

@@ -9,6 +9,7 @@ import contextlib
 
 from .actions import curves_of
 from .evaluation import updated
+from .references import put_at
 
 
 @contextlib.contextmanager
@@ -44,12 +45,3 @@ def value_at(item, path):
     except ValueError:
         return None
     return tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
-
-
-def put_at(item, path, value):
-    owner, _, name = path.rpartition("[" if path.endswith("]") else ".")
-    owner = item.path_resolve(owner) if owner else item
-    if path.endswith("]"):
-        owner[name[1:-2]] = value  # a custom property
-    else:
-        setattr(owner, name, value)

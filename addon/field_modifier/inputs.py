@@ -47,11 +47,3 @@ def put_attribute(modifier, name, attribute):
         modifier[f"{key}_use_attribute"] = bool(attribute)
         modifier[f"{key}_attribute_name"] = attribute
     modifier.id_data.update_tag()
-
-
-def objects(modifier):
-    """The values of its object inputs."""
-    sockets = [
-        one for one in modifier.node_group.interface.items_tree if getattr(one, "in_out", "") == "INPUT"
-    ]
-    return [get(modifier, one.name) for one in sockets if one.socket_type == "NodeSocketObject"]

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Result objects: made once for a source and kind, updated in place by later runs."""
 
-import contextlib
 import json
 
 import bpy
@@ -144,30 +143,6 @@ def warp_mesh(context, source, before, after):
     applied = shown_mesh(context, source, len(after))
     mesh_arrays.set_positions(applied, after)
     return applied
-
-
-def copy_modifiers(item, given):
-    """Gives a result these modifiers of its source."""
-    item.modifiers.clear()
-    for one in given:
-        made = item.modifiers.new(one.name, one.type)
-        for field in one.bl_rna.properties:
-            if not field.is_readonly:
-                with contextlib.suppress(TypeError, ValueError, AttributeError):  # not valid for this type
-                    setattr(made, field.identifier, getattr(one, field.identifier))
-        if one.type == "NODES":
-            for name in one.keys():  # noqa: SIM118
-                made[name] = one[name]
-
-
-def retarget(item, own):
-    """Replaces pointers of a copy's modifiers and constraints by `own`, {data-block: its twin}."""
-    ends = [*item.modifiers, *item.constraints]
-    ends += [one for constraint in item.constraints for one in getattr(constraint, "targets", ())]
-    for end in ends:
-        for field in end.bl_rna.properties:
-            if field.type == "POINTER" and not field.is_readonly and getattr(end, field.identifier) in own:
-                setattr(end, field.identifier, own[getattr(end, field.identifier)])
 
 
 def shown_mesh(context, source, count, in_place=False):

@@ -4,7 +4,7 @@
 import bpy
 
 from ..blender.object_references import settings_of
-from ..field_modifier import inputs
+from ..blender.references import parts_of, references
 from ..handles import empties, movers
 from .contact import listed
 
@@ -41,30 +41,15 @@ def involved(source, kind):
         if one is None or one in found:
             continue
         found[one] = None
-        if isinstance(one, bpy.types.Object):
-            bones = one.pose.bones if one.pose is not None else ()
-            used += [one.parent, one.data, *objects_of(one.modifiers), *objects_of(one.constraints)]
-            used += [item for bone in bones for item in objects_of(bone.constraints)]
-        used += [getattr(one, "shape_keys", None), *read_by_drivers(one)]
+        used += [getattr(one, name, None) for name in ("parent", "data", "shape_keys")]
+        used += [item for part in parts_of(one) for item in read_by(part)]
     return list(found)
 
 
-def objects_of(parts):
-    """The objects that modifiers or constraints refer to: targets, poles, inputs of nodes."""
-    for part in parts:
-        for holder in (part, *getattr(part, "targets", ())):
-            names = [one.identifier for one in holder.bl_rna.properties if one.type == "POINTER"]
-            values = [getattr(holder, name) for name in names]
-            if getattr(holder, "type", "") == "NODES" and holder.node_group is not None:
-                values += inputs.objects(holder)
-            yield from (value for value in values if isinstance(value, bpy.types.Object))
-
-
-def read_by_drivers(item):
-    """The data-blocks that this one's drivers read."""
-    data = getattr(item, "animation_data", None)
-    for curve in data.drivers if data else ():
-        yield from (target.id for variable in curve.driver.variables for target in variable.targets)
+def read_by(part):
+    """The objects that a modifier or constraint reads, or the data-block that a driver's variable reads."""
+    kind = bpy.types.ID if isinstance(part, bpy.types.DriverTarget) else bpy.types.Object
+    return [value for _, value in references(part) if isinstance(value, kind)]
 
 
 def ranges_of(item):

@@ -5,7 +5,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..blender import mesh_arrays, modifier_stack
-from ..blender.actions import own_action, remove_curves
+from ..blender.actions import remove_curves
 from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import in_scene, settings_of
 from ..carried import refusals
@@ -20,7 +20,6 @@ from ..core.runtime import native
 from ..field_modifier import motion
 from ..handles.empties import matrix_of
 from ..names import COPY_OF
-from ..results.result_objects import retarget
 from . import rigs
 
 PLACING = ("location", "rotation_", "scale", "delta_")  # data paths of transform channels
@@ -39,7 +38,7 @@ def copies(context, source, target, given, own):
         (transform(world, given.rest), transform(world, given.moved), wrapped),
         (transform(there, own[0]), onto),
     )
-    twins, made, notes = rigs.twins(source, target), {}, []
+    twins, made, notes = rigs.counterparts(source, target), {}, []
     posing = {rig: twins[rig] for rig in above_field(source) if rig in twins}
     for entry in settings_of(source).carried:
         item = entry.item
@@ -59,8 +58,7 @@ def copies(context, source, target, given, own):
             continue
         made[item] = copy_of(item, target, posing)
         put(context, made[item], target, matrix, shape, posing)
-    for copied in made.values():
-        retarget(copied, twins | made)
+    rigs.remap_copies(made, twins)
     return len(made), notes
 
 
@@ -108,17 +106,12 @@ def copy_of(item, target, posing):
         for child in parent.children:
             if child.get(COPY_OF) == item.name:
                 return child
-    copied = item.copy()
-    if item.data is not None:
-        copied.data = item.data.copy()
+    copied = rigs.copied(item, target)
     if item.type == "MESH":
         motion.discard(copied)
-    copied.name, copied[COPY_OF] = f"{item.name} {target.name}", item.name
+    copied[COPY_OF] = item.name
     settings_of(copied).carried_by = None
-    own_action(copied)
     remove_curves(copied, lambda one: one.data_path.startswith(PLACING))
-    for home in target.users_collection:
-        home.objects.link(copied)
     return copied
 
 

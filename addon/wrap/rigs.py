@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copies of armatures for a target, and their references in drivers, modifiers and constraints."""
+"""Copies of a source's armatures and carried objects for a target, and their references."""
 
-import bpy
-
+from ..blender import references
 from ..blender.actions import own_action
 from ..blender.object_references import settings_of
 
@@ -17,46 +16,50 @@ def pairs(source, target):
     }
 
 
-def twins(source, target):
-    """{object or data of the source: its counterpart of the target}."""
-    own = {source: target, source.data: target.data}
-    for given, there in pairs(source, target).items():
-        own |= {given: there, given.data: there.data}
+def counterparts(source, target):
+    """{data-block of the source: the target's}: of both objects and of the armatures that pose them."""
+    own = {}
+    for given, there in [(source, target), *pairs(source, target).items()]:
+        own |= zip(blocks_of(given), blocks_of(there), strict=False)
     return own
 
 
-def copied(rig, target):
-    """A copy at the same place, in the target's collections."""
-    own = rig.copy()
-    own.data = rig.data.copy()
-    own.name = f"{rig.name} {target.name}"
-    own_action(own)
+def blocks_of(item):
+    """The object, its data and their shape keys, as far as there are any."""
+    blocks = [item, item.data, getattr(item.data, "shape_keys", None)]
+    return [block for block in blocks if block is not None]
+
+
+def copied(item, target):
+    """A copy with data and actions of its own at the same place, in the target's collections."""
+    own = item.copy()
+    if item.data is not None:
+        own.data = item.data.copy()
+    own.name = f"{item.name} {target.name}"
+    for block in blocks_of(own):
+        own_action(block)
     settings_of(own).rest_bones = ""  # its bones are not fitted
     for home in target.users_collection:
         home.objects.link(own)
     return own
 
 
+def remap_copies(made, own):
+    """Replaces references of copies, {object: its copy}, to one another and by `own`."""
+    for given, there in made.items():
+        own = own | dict(zip(blocks_of(given), blocks_of(there), strict=False))
+    for block in [block for there in made.values() for block in blocks_of(there)]:
+        references.remap(references.parts_of(block), own)
+
+
 def copy_drivers(source, target):
-    """Copies the drivers of the source's keys; references to the source become those to its twin."""
+    """Copies the drivers of the source's keys; references to the source become those to its counterpart."""
     given, keys = source.data.shape_keys, target.data.shape_keys
     if given.animation_data is None:
         return
-    own = {**twins(source, target), given: keys}
+    own = counterparts(source, target)
     for curve in given.animation_data.drivers:
         if keys.animation_data is not None and keys.animation_data.drivers.find(curve.data_path):
             keys.driver_remove(curve.data_path)
         made = keys.animation_data_create().drivers.from_existing(src_driver=curve)
-        for variable in made.driver.variables:
-            for read in variable.targets:
-                if own.get(read.id) is not None:
-                    copy_property(read.id, own[read.id], read.data_path)
-                    read.id = own[read.id]
-
-
-def copy_property(given, there, path):
-    """Copies a custom property that a driver reads to a twin that lacks it."""
-    name = bpy.utils.unescape_identifier(path[2:-2]) if path.startswith('["') else ""
-    if name in given and name not in there:
-        there[name] = given[name]
-        there.id_properties_ui(name).update_from(given.id_properties_ui(name))
+        references.remap(references.read_by(made), own)

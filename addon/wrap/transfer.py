@@ -136,7 +136,7 @@ class Transfer:
         """Gives the target a copy of the armature, if its bones are fitted to the wrapped shape."""
         if not settings_of(self.source).under_rig:
             return 0
-        done = 0
+        done, made = 0, {}
         for given in self.source.modifiers:
             if given.type != "ARMATURE" or given.object is None:
                 continue
@@ -147,10 +147,11 @@ class Transfer:
             if modifier is None or modifier.type != "ARMATURE":
                 modifier = self.target.modifiers.new(given.name, "ARMATURE")
             if modifier.object is None or modifier.object == given.object:
-                modifier.object = rigs.copied(given.object, self.target)
+                modifier.object = made[given.object] = rigs.copied(given.object, self.target)
             for name in ("use_deform_preserve_volume", "use_vertex_groups", "use_bone_envelopes"):
                 setattr(modifier, name, getattr(given, name))
             done += 1
+        rigs.remap_copies(made, rigs.counterparts(self.source, self.target))
         return done
 
     def carried(self):

@@ -9,6 +9,9 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.live import step
+    from support.blender.stacks import reading_nodes
+
+    from addon.field_modifier import inputs
 
 pytestmark = pytest.mark.in_blender
 
@@ -19,6 +22,7 @@ def test_modifiers_behind_the_field_act_on_the_baked_object_too():
     laid = sleeve.modifiers.new("Laid", "SHRINKWRAP")
     laid.target, laid.wrap_mode, laid.offset = bar, "OUTSIDE", 0.05
     sleeve.modifiers.new("Finer", "SUBSURF")
+    inputs.put(reading_nodes(sleeve, bar), "Share", 0.25)
     scenes.activate(sleeve, bar)
     bpy.ops.arapfields.carry()
     for frame, height in ((1, 0.0), (3, 0.4)):
@@ -37,7 +41,9 @@ def test_modifiers_behind_the_field_act_on_the_baked_object_too():
         scenes.activate(bar)
         assert bpy.ops.arapfields.bake(format="KEYS", start=1, end=3) == {"FINISHED"}
         baked = bpy.data.objects["Sleeve_baked"]
-        assert [one.type for one in baked.modifiers] == ["SHRINKWRAP", "SUBSURF"]
+        assert [one.type for one in baked.modifiers] == ["SHRINKWRAP", "SUBSURF", "NODES"]
+        read = [inputs.get(baked.modifiers["Nodes"], name) for name in ("Goal", "Share")]
+        assert read == [bpy.data.objects["Bar_baked"], 0.25]
         for frame, points in live.items():
             bpy.context.scene.frame_set(frame)
             bpy.context.view_layer.update()

@@ -7,9 +7,8 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.stacks import armature
+    from support.blender.stacks import armature, reading_nodes
 
-    from addon.field_modifier import inputs
     from addon.solver.frame_range import animation_range
 
 pytestmark = pytest.mark.in_blender
@@ -70,12 +69,7 @@ def by_a_path(bar, moving):
 
 
 def by_an_object_of_nodes(bar, _):
-    group = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
-    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    group.interface.new_socket("Goal", in_out="INPUT", socket_type="NodeSocketObject")
-    modifier = bar.modifiers.new("Nodes", "NODES")
-    modifier.node_group = group
-    inputs.put(modifier, "Goal", keyed(empty()))
+    reading_nodes(bar, keyed(empty()))
 
 
 def by_an_obstacle(bar, _):

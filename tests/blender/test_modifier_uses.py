@@ -14,7 +14,7 @@ if IN_BLENDER:
     from mathutils import Matrix
     from support.blender import scenes
     from support.blender.scenes import FIT
-    from support.blender.stacks import build, local_points
+    from support.blender.stacks import build, local_points, reading_nodes
 
     from addon.blender import modifier_stack
     from addon.blender.object_references import source_of
@@ -155,19 +155,12 @@ def test_the_shape_is_read_at_the_scenes_own_time():
 
 def test_reading_the_shape_leaves_no_users_behind():
     bar, *_ = scenes.bar_with_handles()
-    group = bpy.data.node_groups.new("Beside", "GeometryNodeTree")
-    for way in ("INPUT", "OUTPUT"):
-        group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    group.interface.new_socket("Object", in_out="INPUT", socket_type="NodeSocketObject")
-    ends = [group.nodes.new(f"NodeGroup{end}") for end in ("Input", "Output")]
-    group.links.new(ends[0].outputs[0], ends[1].inputs[0])
-    modifier = bar.modifiers.new("Beside", "NODES")
-    modifier.node_group, named = group, bpy.data.objects.new("Named", None)
-    inputs.put(modifier, "Object", named)
+    named = bpy.data.objects.new("Named", None)
+    modifier = reading_nodes(bar, named)
     before = named.users
     with modifier_stack.mesh_of(bpy.context, bar, []) as mesh:
         assert len(mesh.vertices) == len(bar.data.vertices)
-    assert named.users == before and inputs.get(modifier, "Object") == named
+    assert named.users == before and inputs.get(modifier, "Goal") == named
 
 
 def test_a_result_brings_no_source_along_when_it_is_appended():

@@ -8,11 +8,12 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from mathutils import Vector
-    from support.blender import scenes, wraps
+    from support.blender import scenes, stacks, wraps
     from support.blender.character import link
     from support.blender.stages import all_said
 
     from addon.blender.actions import curves_of
+    from addon.field_modifier import inputs
 
 pytestmark = pytest.mark.in_blender
 
@@ -86,6 +87,38 @@ def test_modifiers_and_constraints_of_copies_read_what_the_target_has():
     assert made.modifiers["Near"].target == target
     assert [one.target for one in made.constraints] == [copies()["Spot"], bpy.data.objects["Rig Soup"]]
     assert away.target == item and [one.target for one in eye.constraints] == [spot, rig]
+
+
+def test_nodes_drivers_and_bones_of_copies_read_what_the_target_has():
+    item, rig = wraps.rigged_bar()
+    target = wraps.soup_of(item)
+    item.arapfields.wrap.onto = target
+    rig.data["leg"] = 0.5
+    rig.pose.bones["Upper"].constraints.new("DAMPED_TRACK").target = item
+    eye = ball("Eye", (0.6, -0.3, 0.1))
+    eye.shape_key_add(name="Basis")
+    stacks.reading_nodes(eye, item)
+    for owner, path, block, value in (
+        (eye.shape_key_add(name="Up"), "value", item.data.shape_keys, 'key_blocks["Fat"].value'),
+        (rig, "empty_display_size", rig.data, '["leg"]'),
+    ):
+        variable = owner.driver_add(path).driver.variables.new()
+        variable.targets[0].id_type = block.id_type
+        variable.targets[0].id, variable.targets[0].data_path = block, value
+    scenes.activate(eye, item)
+    bpy.ops.arapfields.carry(way="RIGID")
+    assert bpy.ops.arapfields.wrap(**wraps.SMALL) == {"FINISHED"}
+    assert bpy.ops.arapfields.transfer() == {"FINISHED"}
+
+    def read_by(eye, rig):
+        owners = eye.data.shape_keys, rig
+        driven = [one.animation_data.drivers[0].driver.variables[0].targets[0].id for one in owners]
+        tracked = rig.pose.bones["Upper"].constraints[0].target
+        return [*driven, tracked, inputs.get(eye.modifiers["Nodes"], "Goal")]
+
+    twin = bpy.data.objects["Rig Soup"]
+    assert read_by(eye, rig) == [item.data.shape_keys, rig.data, item, item]
+    assert read_by(copies()["Eye"], twin) == [target.data.shape_keys, twin.data, target, target]
 
 
 @pytest.mark.parametrize("way", ["FOLLOW", "RIGID"])

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""References of a data-block to others: by modifiers with their inputs of nodes, constraints and drivers."""
+
+import contextlib
+
+import bpy
+
+
+def parts_of(block):
+    """The parts of a data-block that refer to others: modifiers, constraints of it and its bones with their
+    targets, and the targets of its drivers' variables."""
+    yield from getattr(block, "modifiers", ())
+    bones = block.pose.bones if getattr(block, "pose", None) else ()
+    for constraint in (one for owner in (block, *bones) for one in getattr(owner, "constraints", ())):
+        yield constraint
+        yield from getattr(constraint, "targets", ())
+    data = getattr(block, "animation_data", None)
+    for curve in data.drivers if data else ():
+        yield from read_by(curve)
+
+
+def read_by(curve):
+    """The targets of a driver's variables."""
+    return [target for variable in curve.driver.variables for target in variable.targets]
+
+
+def paths_of(part):
+    """Data paths of the writable properties of a modifier, constraint or target, and of inputs of nodes."""
+    paths = writable(part)
+    if getattr(part, "type", "") != "NODES":
+        return paths
+    if not hasattr(part, "properties"):  # before Blender 5.2, inputs are ID properties
+        return paths + [f'["{name}"]' for name in part.keys()]  # noqa: SIM118
+    for side in ("inputs", "outputs"):
+        slots = getattr(part.properties, side)
+        names = [one.identifier for one in slots.bl_rna.properties if one.type == "POINTER"]
+        for name in names[1:]:  # the first is rna_type
+            paths += [f"properties.{side}.{name}.{value}" for value in writable(getattr(slots, name))]
+    return paths
+
+
+def writable(struct):
+    return [one.identifier for one in struct.bl_rna.properties if not one.is_readonly]
+
+
+def references(part):
+    """[(data path, data-block)] of a part's references."""
+    found = [(path, part.path_resolve(path)) for path in paths_of(part)]
+    return [(path, value) for path, value in found if isinstance(value, bpy.types.ID)]
+
+
+def put_at(item, path, value):
+    """Sets the property, or the custom property, at a data path."""
+    owner, _, name = path.rpartition("[" if path.endswith("]") else ".")
+    owner = item.path_resolve(owner) if owner else item
+    if path.endswith("]"):
+        owner[name[1:-2]] = value
+    else:
+        setattr(owner, name, value)
+
+
+def remap(parts, own):
+    """Replaces references of a copy's parts by `own`, {data-block: its counterpart}."""
+    for part in parts:
+        for path, value in references(part):
+            if own.get(value) is not None:
+                if isinstance(part, bpy.types.DriverTarget):
+                    copy_property(value, own[value], part.data_path)
+                put_at(part, path, own[value])
+
+
+def copy_property(given, there, path):
+    """Copies a custom property that a driver reads to a counterpart that lacks it."""
+    name = bpy.utils.unescape_identifier(path[2:-2]) if path.startswith('["') else ""
+    if name in given and name not in there:
+        there[name] = given[name]
+        there.id_properties_ui(name).update_from(given.id_properties_ui(name))
+
+
+def copy_modifiers(item, given):
+    """Replaces an object's modifiers by copies of these, of another object."""
+    item.modifiers.clear()
+    for one in given:
+        made = item.modifiers.new(one.name, one.type)
+        for path in paths_of(one):
+            with contextlib.suppress(TypeError):  # an enum without items, whose value is ""
+                put_at(made, path, one.path_resolve(path))
