@@ -9,6 +9,7 @@ import bpy
 
 from ..blender.host import has_window
 from ..blender.object_references import settings_of
+from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.runtime.coroutines import run_to_completion, step_for
 from ..core.runtime.latest_request_worker import REST, LatestRequestWorker
@@ -188,6 +189,8 @@ class Session:
         is_new = self.requested is None or self.playback.steps_motion(request, frame)
         if is_new or not request.is_like(self.requested):
             self.requested, self.is_quiet = request, self.is_restored
+            if self.is_quiet:
+                self.touching = None  # of the shape before; solving this request finds its own
             if self.playback.begin(request, frame):
                 self.worker.request(request)
         self.playback.advance(self.requested, frame)
@@ -195,35 +198,29 @@ class Session:
     def restored(self, is_held=False):
         """Called after undo or a cancelled drag has changed the source and its handles.
 
-
         `is_held`: the shape stays as it is until a handle moves.
         """
         self.is_restored = self.is_quiet = True
         self.is_held = is_held
 
     def show(self):
-        """Shows the newest shape; True when there was one."""
+        """Shows the newest shape, if there is one."""
         shape, error = self.worker.poll() if self.worker is not None else (None, "")
         if error:
             raise UserError(error)
         shape = self.playback.shape(self.requested, otherwise=shape)
-        if shape is None or self.is_quiet:
-            return False
+        if shape is None:
+            return
         source = self.source.get()
-        is_shown = self.display.show(source, shape)
-        if is_shown:
+        if self.is_quiet:
+            if shape.of is not None and stored.mark(source) == self.digest(shape.of):
+                self.touching = shape.touching
+                redraw(bpy.context, "WINDOW")
+        elif self.display.show(source, shape):
             self.touching = shape.touching
             self.carrying.show(shape.carried)
             if self.display.in_place:
-                self.note(source, shape)
-        return is_shown
-
-    def note(self, source, shape):
-        """Marks the source with the digest of the request whose shape is on display."""
-        key = stored.UNSETTLED if shape.of is None else self.digest(shape.of)
-        stored.put_mark(source, key)
-        if shape.of is not None:
-            stored.shapes.keep(key, motion.Motion(shape.points - shape.rest, shape.turns, shape.changes))
+                stored.note(source, "" if shape.of is None else self.digest(shape.of), shape)
 
     def show_frame(self, context):
         """Shows the current frame if it is solved; with secondary motion, waits up to PATIENCE for it."""

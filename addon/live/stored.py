@@ -64,6 +64,13 @@ def put_mark(source, key):
             del mesh[SHAPE_OF]
 
 
+def note(source, key, shape):
+    """Marks the source with the digest of the request whose shape is on display; "": of none yet."""
+    put_mark(source, key or UNSETTLED)
+    if key:
+        shapes.keep(key, motion.Motion(shape.points - shape.rest, shape.turns, shape.changes))
+
+
 def hold(source, pose):
     """Makes the source's present shape that of a pose, given by its digest."""
     shape = motion.snapshot(source)

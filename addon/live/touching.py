@@ -16,7 +16,7 @@ def places():
     """(k, 3) contact points of the panel's source, in world space."""
     source = source_of(bpy.context)
     session = sessions.live.get(source.session_uid) if source is not None else None
-    touching = None if session is None or session.is_quiet else session.touching
+    touching = None if session is None else session.touching
     if touching is None or not len(touching):
         return np.empty((0, 3))
     world = np.array(source.matrix_world)

@@ -9,37 +9,17 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.baking import at, cache_file, solved
+    from support.blender.contact import lowest, pressed
     from support.blender.live import step
     from support.blender.panels import Layout
     from support.blender.stacks import local_points
 
     from addon.core.runtime import jobs
-    from addon.live import sessions, touching
+    from addon.live import touching
     from addon.pin_tool.tool import ARAPFIELDS_TOOL_pin
-    from addon.solver import contact, setup
+    from addon.solver import contact
 
 pytestmark = pytest.mark.in_blender
-
-
-def pressed():
-    """A live bar of which one end goes down, and a block below it."""
-    setup.SAMPLES = 3000  # a live solver's own: fewer leave gaps for a corner to pass
-    bar, _, moving = scenes.bar_with_handles()
-    low = (bar.matrix_world @ bar.data.vertices[0].co).z
-    for vertex in bar.data.vertices:
-        low = min(low, (bar.matrix_world @ vertex.co).z)
-    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(moving.location.x, moving.location.y, low - 0.7))
-    block = bpy.context.object
-    moving.location.z -= 0.8
-    scenes.activate(bar)
-    return bar, block, low
-
-
-def lowest(bar):
-    sessions.update(bpy.context, wait=600, refined=True)
-    return (local_points(bar) @ np.array(bar.matrix_world)[:3, :3].T + np.array(bar.matrix_world)[:3, 3])[
-        :, 2
-    ].min()
 
 
 def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
