@@ -66,4 +66,11 @@ def is_driven(item):
 
 def is_animated(item):
     """Whether keyframes, drivers or constraints may move an object or one of its ancestors."""
-    return is_driven(item) or (item.parent is not None and is_animated(item.parent))
+    return any(map(is_driven, with_ancestors(item)))
+
+
+def with_ancestors(item):
+    """Yields the object, its parent, the parent's parent and so on; nothing for None."""
+    while item is not None:
+        yield item
+        item = item.parent

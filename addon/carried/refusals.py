@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """UserErrors that say why an object is not carried."""
 
+from ..blender.evaluation import with_ancestors
 from ..blender.modifier_stack import handle_rigs
 from ..blender.object_references import in_scene, settings_of
 from ..blender.splat_layouts import holds_splats
@@ -60,11 +61,9 @@ def of_splats(item):
 def moves_anyway(source, item):
     """UserError if an object already follows another one that the field moves; else None."""
     carried = [entry.item for entry in settings_of(source).carried if entry.item not in (None, item)]
-    parent = item.parent
-    while parent is not None:
+    for parent in with_ancestors(item.parent):
         if parent in carried and is_moved_whole(source, parent):
             return moves_with(item, parent)
-        parent = parent.parent
     for modifier in item.modifiers:
         target = getattr(modifier, BINDING[modifier.type]) if modifier.type in BINDING else None
         if modifier.show_viewport and target is not None and target in [source, *carried]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from mathutils import Matrix
 
+from ..blender.evaluation import with_ancestors
 from ..core.errors import UserError
 from .rest_bones import resting
 
@@ -117,9 +118,7 @@ def names(item):
 
 def hangs_on(item, rigs):
     """Whether an object or one of its ancestors is parented to a bone of one of these armatures."""
-    if item.parent is None:
-        return False
-    return (item.parent in rigs and item.parent_type == "BONE") or hangs_on(item.parent, rigs)
+    return any(one.parent in rigs and one.parent_type == "BONE" for one in with_ancestors(item))
 
 
 def constrained_to(item, rigs):

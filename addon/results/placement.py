@@ -9,6 +9,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..blender import mesh_arrays, modifier_stack
+from ..blender.evaluation import is_driven, with_ancestors
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
 from ..blender.splat_layouts import holds_splats
@@ -110,22 +111,13 @@ def place_result(context, source, kind, output, result, moved, before):
 def holds_place(source, target):
     """Whether the source's transform must stay: because animation, constraints, handles, armatures or a
     sheared parent depend on it, or the target of its wrap is its child."""
-    settings, data = settings_of(source), source.animation_data
-    bound = source.constraints or settings.carried or empties.used(source)
+    bound = is_driven(source) or settings_of(source).carried or empties.used(source)
     posed = any(modifier.type == "ARMATURE" for modifier in source.modifiers)
-    moved = data is not None and (data.action or data.drivers or data.nla_tracks)
     parent = source.parent
     sheared = parent is not None and not np.array_equal(
         space_of(parent.matrix_world).local_to_solve, np.eye(4)
     )
-    return bool(bound or posed or moved or sheared or hangs_on(target, source))
-
-
-def hangs_on(item, other):
-    """Whether an object is a descendant of another."""
-    while item is not None and item.parent != other:
-        item = item.parent
-    return item is not None
+    return bool(bound or posed or sheared or source in with_ancestors(target))
 
 
 def put(context, item, place):

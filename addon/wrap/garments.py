@@ -6,7 +6,7 @@ from mathutils import Matrix
 
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.actions import remove_curves
-from ..blender.evaluation import depsgraph_of
+from ..blender.evaluation import depsgraph_of, with_ancestors
 from ..blender.object_references import in_scene, settings_of
 from ..carried import refusals
 from ..carried.carried_objects import carrier_class
@@ -138,10 +138,8 @@ def put(context, copied, target, matrix, shape, posing):
 
 def bone_of(copied, posing):
     """(the target's armature, name of the bone) to parent a copy to; (None, "") without one."""
-    item = copied
-    while item.parent is not None:
+    for item in with_ancestors(copied):
         rig = posing.get(item.parent, item.parent if item.parent in posing.values() else None)
         if item.parent_type == "BONE" and rig is not None and item.parent_bone in rig.data.bones:
             return rig, item.parent_bone
-        item = item.parent
     return None, ""
