@@ -103,7 +103,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
         operator.warnings += [about(owner.name, reason) for reason in reasons]
         named = "" if item == owner else item.name
         shown = named + visibility.hidden_note(visibility.show_alone(owner, item))
-        figures = solved.report | of_own_handles(solved.report, handle_count)
+        figures = solved.report | handle_error(solved.report, handle_count)
         return describe(shown.strip(), figures, np.ptp(surface.vertices, axis=0).max())
 
     edits = () if result == "NEW" else (surface.reference,)
@@ -122,7 +122,7 @@ class SolveOperator(JobOperator):
         """Checks the settings in the user interface only; a script's arguments are checked in `plan`."""
         return placement_refusal(source) if has_window() else None
 
-    def keep_undo_true(self):
+    def push_undo(self):
         if self.ended_live:
             bpy.ops.ed.undo_push(message="Live")
 
@@ -147,14 +147,17 @@ class SolveOperator(JobOperator):
         return placement.in_place(*destination(settings_of(source), self))
 
 
-def of_own_handles(report, count):
-    """{"handle_error_max"} of the first `count` handles: the FAR handle, which comes last, does not count."""
+def handle_error(report, count):
+    """{"handle_error_max": largest error of the first `count` handles}, which are the user's."""
     errors = [handle["error_max"] for handle in report.get("handles", ())][:count]
     return {"handle_error_max": max(errors)} if errors else {}
 
 
 def describe(shown, report, size):
-    """One line on a solve's quality, for an object of that size; `shown`: names of affected objects."""
+    """One line: `shown` (the new object, what was hidden), the errors of handles or of the wrap, and folds.
+
+    `size`: the object's longest side, of which errors are shares.
+    """
     figures = [shown] if shown else []
     if report.get("handle_error_max"):
         share = max(0.001, math.ceil(1000 * report["handle_error_max"] / size) / 1000)

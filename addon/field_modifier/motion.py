@@ -105,7 +105,8 @@ def take_group(modifier, group):
 
 
 def take_helper(source, modifier, mesh):
-    """Makes the modifier read its offsets from this mesh."""
+    """Makes `mesh` the helper's, without its other attributes and materials; it keeps the motion of the mesh
+    before if that has as many points."""
     own = [one.name for one in mesh.attributes if not (one.is_required or one.is_internal)]
     for name in own:  # by name: removing an attribute invalidates the other references
         if name not in (OFFSETS, TURNS):

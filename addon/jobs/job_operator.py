@@ -92,15 +92,15 @@ class JobOperator(ModalRun, Guided):
         finally:
             self.clear_up(job)
         if result == {"CANCELLED"}:
-            self.keep_undo_true()
+            self.push_undo()
         return result
 
     def work_beside(self, context, job):
         """Coroutine of main-thread work while the worker runs."""
         yield from ()
 
-    def keep_undo_true(self):
-        """Pushes an undo step if a failed job has changed data: Blender pushes none for it."""
+    def push_undo(self):
+        """Pushes an undo step if a job that applied nothing has changed data: Blender pushes none for it."""
 
     def clear_up(self, job):
         """Removes temporary data, however the job has ended."""
@@ -141,7 +141,7 @@ class JobOperator(ModalRun, Guided):
         """Puts one item's result into the scene; returns whether the user cancelled meanwhile."""
         try:
             for reference in outcome.item.edits if self.in_window else ():
-                yield from until_left(job, reference)
+                yield from until_edit_mode_ends(job, reference)
             text = outcome.item.apply(outcome.value)
             if isinstance(text, types.GeneratorType):
                 text = yield from text
@@ -167,8 +167,8 @@ def with_progress(job, coroutine, label):
             return ended.value
 
 
-def until_left(job, reference):
-    """Coroutine that waits while an object is in Edit Mode, whose exit overwrites changes of the mesh."""
+def until_edit_mode_ends(job, reference):
+    """Coroutine that waits while an object is in Edit Mode: leaving it overwrites the mesh."""
     while (item := reference.find()) is not None and item.mode == "EDIT":
         job.report_main_thread(1.0, translated("{name} is in Edit Mode; leave it first", name=item.name))
         yield Pause.WORKER

@@ -16,8 +16,8 @@ STEPS, MOST_SHAPES = 3, 60  # quasi-Newton iterations per shape, and most shapes
 # until one is shown.
 NEAR, LATEST = 7e-4, 0.2
 TOLERANCE = 3e-5  # limit of single precision; the last shape is within about 0.3 % of the size
-PACE = 1 / 60  # time step of secondary motion, in seconds
-MOST_PACES = 3  # most time steps that one real-time step merges; each length needs its preconditioner
+# A time step of secondary motion is one to MOST_PACES times PACE seconds: each length has its preconditioner.
+PACE, MOST_PACES = 1 / 60, 3
 STILL, STILL_STEPS = 1e-3, 20  # at rest: below this share of the size per second, for so many steps
 
 

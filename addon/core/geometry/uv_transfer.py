@@ -3,7 +3,9 @@
 
 import numpy as np
 
-CUT = 3.0  # a corner whose UV differs from the extrapolated one by this many steps lies beyond a seam
+# A seam lies between a corner and its face's center if the corner's UV is off the extrapolated one by more
+# than this many times the extrapolated change.
+CUT = 3.0
 
 
 def fan(vertices, starts, corners):
