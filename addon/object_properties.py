@@ -20,7 +20,7 @@ from .skin.properties import ARAPFIELDS_PG_skin
 from .stiffness.properties import ARAPFIELDS_PG_stiffness
 from .wrap.properties import ARAPFIELDS_PG_wrap
 
-OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # what library overrides keep: they are carried
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # library overrides keep it, so that they can be carried
 
 
 class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):
@@ -93,7 +93,7 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     )
     output: output()
     surface: surface()
-    target: result()  # as files store it
+    target: result()  # the name in files
     result: result(get=get_result, set=set_result)
     resolution: extraction().get("resolution")
     refine_thin: extraction().get("refine_thin")
@@ -109,12 +109,12 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
 
     @property
     def in_place(self):
-        """Whether a result goes onto the source's own vertices, where they are at the modifier's place."""
+        """Whether the result moves the source's own vertices, at the field modifier's place in the stack."""
         return self.output == "WARP" and self.result != "NEW"
 
     @property
     def owner(self):
-        """The settings of the object that this one, a handle or a result, belongs to; its own for others."""
+        """The settings of the source of this handle or result; for other objects these settings."""
         source = owner_of(self.id_data)
         return settings_of(source) if source is not None else self
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work without a window: `blender --command arapfields VERB …`, and the scripts of blender_scripts/.
+"""Commands without a window: `blender --command arapfields VERB …`, also used by blender_scripts/.
 
 Exit codes: 0 done, 1 something failed, 2 bad input or usage, 130 interrupted.
 """

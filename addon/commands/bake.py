@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""bake: the animation of a .blend as it is, into caches or another program's file, alone or in parts."""
+"""bake: the animation of a .blend, to point caches or an exported file; whole, or one part of the frames."""
 
 import contextlib
 import sys
@@ -18,7 +18,7 @@ EXPORTS = {".abc": "ABC", ".usdc": "USD", ".glb": "GLTF"}
 
 
 def run_bake(options, _):
-    """Exit code 0 when every object's frames are done, or this part of them; 1 when one failed."""
+    """Returns exit code 0 if all frames, or this part of them, are done for every object; else 1."""
     suffix = required_suffix(options)
     target = options.output.resolve() if options.output else None
     folder = options.folder.resolve() if options.folder else None
@@ -50,7 +50,7 @@ def run_bake(options, _):
 
 
 def required_suffix(options):
-    """Of the output, "" without one; UserError where it is unknown, or the input is no scene."""
+    """The output's suffix, "" without an output; UserError if it is unknown or the input is not a .blend."""
     if options.input.suffix.lower() != ".blend":
         raise UserError(f"{options.input}: is no .blend; a scene is baked as it is")
     suffix = options.output.suffix.lower() if options.output else ""
@@ -63,7 +63,7 @@ def required_suffix(options):
 
 
 def frames(options):
-    """What is baked of the selected objects, as arguments of the operators."""
+    """Scope, kind and frame range as arguments of the bake operators."""
     given = {"scope": "SELECTED"}
     if options.kind:
         given["kind"] = options.kind.upper()
@@ -73,7 +73,7 @@ def frames(options):
 
 
 def animated(options):
-    """Every object with handles, or with a style that has keyframes."""
+    """The objects with handles or with an animated style."""
     meshes = [item for item in bpy.context.view_layer.objects if is_source(item)]
     meshes = [item for item in meshes if empties.used(item) or kind_of(item, "AUTO") == "STYLIZE"]
     if not meshes:
@@ -83,8 +83,7 @@ def animated(options):
 
 @contextlib.contextmanager
 def chosen(sources):
-    """Has operators work on these objects, also on those that are disabled in viewports: they are shown and
-    selected for as long as the block runs."""
+    """Context manager: selects these objects for operators; shows those that are hidden or disabled."""
     home, disabled, brought = bpy.context.scene.collection, [], []
     for item in bpy.context.selected_objects:
         item.select_set(False)

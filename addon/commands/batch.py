@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""batch: every file of a folder, each in a Blender of its own: one failure or crash stops no other."""
+"""batch: every file of a folder, each in a separate Blender process, so that a crash stops no other file."""
 
 import sys
 import time
@@ -13,7 +13,7 @@ from .children import Children
 from .parser import FORMATS, solve_settings
 from .record import Record, described, digest, stamp
 
-LOOK = 1.0  # seconds between two looks at what other batches are at work on
+LOOK = 1.0  # seconds between checks of the files that other batches work on
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Task:
 
 
 def run_batch(options, launch):
-    """Works through the folder; exit code 0 when all is done, 1 when a file or an object failed."""
+    """Processes the folder; returns exit code 0 if all is done, 1 if a file or an object failed."""
     begin = time.perf_counter()
     settings = solve_settings(options)
     if "handles" in settings and not settings["handles"].is_file():
@@ -64,7 +64,7 @@ def run_batch(options, launch):
 
 
 def agree(options, record, description):
-    """Names results of other settings or of another version in the folder; parts of one job share both."""
+    """Reports results of other settings or versions in the folder; UserError for a shard if there are any."""
     other = record.agree(description, anew=options.again or not options.shard)
     if other and options.shard and not options.again:
         raise UserError(
@@ -76,7 +76,7 @@ def agree(options, record, description):
 
 
 def plan(options):
-    """The files to work on, in order of their names."""
+    """The Tasks, sorted by path."""
     folder, output = options.input, options.output
     if not folder.is_dir():
         raise UserError(f"{folder}: no such folder (deform and stylize take single files)")
@@ -104,7 +104,7 @@ def plan(options):
 
 
 def refuse_twins(tasks):
-    """Two inputs must not become one output; an OBJ's materials count."""
+    """UserError if two inputs have the same output, or the same material file of an OBJ."""
     taken = {}
     for task in tasks:
         for path in (
@@ -116,7 +116,7 @@ def refuse_twins(tasks):
 
 
 class Work:
-    """Files done so many at a time, each by one batch alone; others may be at work in the same folder."""
+    """Processes files in parallel; several batches may share a folder, and each file is claimed by one."""
 
     def __init__(self, options, settings, launch, record, description):
         self.options, self.flags, self.launch, self.record = options, flags(settings), launch, record
@@ -124,7 +124,7 @@ class Work:
         self.again = options.again
 
     def run(self, todo):
-        """How many files were done, skipped because another batch did them, and failed."""
+        """Returns the numbers of files done, skipped (done by another batch) and failed."""
         counts, number = {"done": 0, "skipped": 0, "failed": 0}, 0
         environment = self.launch.environment(min(self.options.jobs, max(1, len(todo))))
         with (
@@ -144,7 +144,7 @@ class Work:
                         counts[status if status in counts else "failed"] += 1
                         number += 1
                         say(f"[{number}/{len(todo)}] {task.name}: {describe(outcome)}")
-                    if later:  # what another batch is at work on is its own, unless it ends without a result
+                    if later:  # claimed by another batch; taken over if that ends without a result
                         time.sleep(LOOK)
                     waiting = {pool.submit(self.one, task, children): task for task in later}
             except BaseException:
@@ -155,7 +155,7 @@ class Work:
         return counts
 
     def one(self, task, children):
-        """One file's outcome; None while another batch works on it."""
+        """The outcome of one file; None while another batch works on it."""
         if not self.record.claim(task.name):
             return None
         try:
@@ -174,7 +174,7 @@ class Work:
 
 
 def flags(settings):
-    """Settings as the arguments of the single verbs."""
+    """The settings as flags of the verb for one file."""
     arguments = []
     for name, value in settings.items():
         flag = "--" + name.replace("_", "-")
@@ -195,5 +195,5 @@ def describe(outcome):
 
 
 def say(text):
-    """A line; names of files may hold what the terminal cannot show."""
+    """Prints a line; characters that the terminal cannot show are escaped."""
     print(text.encode(errors="backslashreplace").decode(), file=sys.stdout, flush=True)

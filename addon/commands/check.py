@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""check: one report of the machine, of Blender, and of small problems whose answers are known."""
+"""check: a report on the machine, Blender, and small problems with known results."""
 
 import platform
 
@@ -9,7 +9,7 @@ from ..core.runtime import self_check
 
 
 def run_check(*_):
-    """Prints the report; exit code 0 when everything is right, else 1."""
+    """Prints the report; returns exit code 0 if every result is right, else 1."""
     lines, works = self_check.run()
     print(f"Blender {bpy.app.version_string}, {platform.platform()}")
     print("\n".join([*lines, "everything works" if works else "NOT EVERYTHING WORKS"]), flush=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Blenders that a batch starts, one a file, and what became of each."""
+"""The Blender processes that a batch starts, one per file, and their outcomes."""
 
 import contextlib
 import json
@@ -16,12 +16,12 @@ WINDOWS = os.name == "nt"
 
 
 class Children:
-    """The Blenders at work; leaving the block ends those that still are."""
+    """Context manager of the running Blender processes; ends those that still run when it is left."""
 
     def __init__(self, environment, limit):
         self.limit, self.running, self.stopped = limit, set(), False
-        # Nothing is ever written to the pipe; the system closes it with this process. Windows gives a child
-        # the three streams of every program alone, and none starts while another one reads its input.
+        # Nothing is written to the pipe; the system closes it with this process. On Windows a child inherits
+        # only the standard streams, and no child starts while another one reads its input.
         self.pipe = () if WINDOWS else os.pipe()
         self.environment = {**environment, PARENT: str(os.getpid() if WINDOWS else self.pipe[0])}
 
@@ -39,7 +39,7 @@ class Children:
             end(process)
 
     def run(self, command):
-        """One file's outcome; never raises for what happens to the child."""
+        """The outcome of one file; failures of the child are outcomes, not exceptions."""
         begin = time.perf_counter()
         with tempfile.TemporaryDirectory(prefix="arapfields-") as folder:
             report, log = Path(folder) / "report.json", Path(folder) / "log"
@@ -51,13 +51,13 @@ class Children:
         return {**outcome, "seconds": round(time.perf_counter() - begin, 2)}
 
     def ties(self):
-        """A Ctrl-C reaches the batch alone, which ends its children; its pipe reaches them."""
+        """Arguments of Popen: a child gets the pipe, and no Ctrl-C, for which the batch ends its children."""
         if WINDOWS:
             return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
         return {"pass_fds": self.pipe[:1], "start_new_session": True}
 
     def wait(self, command, stream):
-        """The child's exit code; None when it took too long."""
+        """The child's exit code; None after the time limit."""
         if self.stopped:
             return 130
         process = subprocess.Popen(
@@ -79,8 +79,8 @@ class Children:
 
 
 def end(process):
-    """Asks a child to stop, which leaves no partial files; one that does not listen is killed."""
-    with contextlib.suppress(OSError, SystemError):  # Windows sends it through a console alone
+    """Interrupts a child, which leaves no partial files; kills it if it does not end in time."""
+    with contextlib.suppress(OSError, SystemError):  # Windows sends the signal only through a console
         process.send_signal(signal.CTRL_BREAK_EVENT if WINDOWS else signal.SIGINT)
     try:
         process.wait(5.0)
@@ -90,7 +90,7 @@ def end(process):
 
 
 def read_objects(report):
-    """What a child says of its objects; nothing where it did not come to that."""
+    """The outcomes of objects in a child's report; [] without a report."""
     try:
         objects = json.loads(report.read_text(encoding="utf-8"))["objects"]
         return [{**o, "status": str(o["status"]), "message": str(o["message"])} for o in objects]
@@ -99,7 +99,7 @@ def read_objects(report):
 
 
 def understand(code, report, log):
-    """{"status", "message", "objects"} from what a child left."""
+    """{"status", "message", "objects"} from a child's exit code, report and log."""
     objects = read_objects(report)
     failures = [o["message"] for o in objects if o["status"] != "done"]
     if code == 0 and objects:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flags of what surfaces do not pass."""
+"""Flags of contact: obstacles, ground and self-contact."""
 
 import argparse
 import math

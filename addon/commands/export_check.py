@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether an exported mesh file is whole: Blender's exporters are silent on a full disk. Without bpy."""
+"""Checks that exported mesh files are complete: Blender's exporters report no full disk. Without bpy."""
 
 import struct
 
@@ -13,7 +13,7 @@ PLY_SIZES = {
 
 
 def is_whole(path, meshes):
-    """Whether the file holds all that was exported of these meshes (vertices, polygons, loops)."""
+    """Whether the file contains all of these meshes, (vertices, polygons, loops) each."""
     polygons = sum(len(mesh.polygons) for mesh in meshes)
     corners = sum(len(mesh.loops) for mesh in meshes)
     try:
@@ -33,7 +33,7 @@ def _stl(path, triangles):
 
 
 def _ply(path, polygons, corners):
-    """Little-endian, as Blender writes it: vertices and edges have one size each, a face's list its own."""
+    """Little-endian PLY of Blender: vertices and edges have a fixed size, faces are lists."""
     size, counts, lists = 0, {}, {}
     with path.open("rb") as file:
         for line in iter(file.readline, b""):

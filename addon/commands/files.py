@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes and .blend files by Blender, in the file's own coordinates; outputs appear whole."""
+"""Reads and writes meshes and .blend files in the file's coordinates; outputs are replaced atomically."""
 
 import contextlib
 import errno
@@ -15,8 +15,8 @@ from ..core.errors import UserError
 from .export_check import is_whole
 from .parser import FORMATS
 
-ROOM = 1 << 20  # bytes; a disk with less is full
-AXES = {"forward_axis": "Y", "up_axis": "Z"}  # coordinates stay as they are in the file
+ROOM = 1 << 20  # bytes; a disk with less free space counts as full
+AXES = {"forward_axis": "Y", "up_axis": "Z"}  # no conversion of axes
 READ = {
     ".ply": lambda path: bpy.ops.wm.ply_import(filepath=path, **AXES),
     ".obj": lambda path: bpy.ops.wm.obj_import(filepath=path, **AXES),
@@ -25,13 +25,12 @@ READ = {
 
 
 def for_blender(path):
-    """The path as Blender takes it, which tells relative ones from PWD: a program may have started it in
-    another folder."""
+    """The absolute path: Blender resolves relative ones from PWD, which may be another folder."""
     return os.path.abspath(path)
 
 
 def check(path):
-    """The path with a suffix that can be read and written; UserError otherwise."""
+    """Returns the path; UserError if its suffix is none that can be read and written."""
     if path.suffix.lower().lstrip(".") not in FORMATS:
         known = ", ".join(f".{name}" for name in FORMATS)
         raise UserError(f"{path}: unknown extension; known are {known}")
@@ -39,7 +38,7 @@ def check(path):
 
 
 def check_place(path):
-    """Before anything is solved: an error where no file can take this place, or no room is left."""
+    """UserError or OSError if no file can be written to this path, or the disk is full; before any solve."""
     from arapfields._native import OutputFile
 
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -53,18 +52,18 @@ def full(path):
 
 
 def not_whole(path):
-    """What to raise where Blender, which does not tell, has written a part of a file."""
+    """The error for an incomplete file, which Blender does not report."""
     if shutil.disk_usage(path.parent).free < ROOM:
         return full(path)
     return UserError(f"{path}: Blender could not write all of it; the disk may be full")
 
 
 def read(path):
-    """Makes the file's content all that is in this Blender."""
+    """Opens a .blend, or imports a mesh file into an empty scene."""
     if not check(path).is_file():
         raise UserError(f"{path}: no such file")
     nothing = UserError(f"{path}: holds no mesh, or is damaged")
-    if path.stat().st_size == 0:  # each version of Blender says something else
+    if path.stat().st_size == 0:  # versions of Blender differ in their messages
         raise nothing
     try:
         if path.suffix.lower() == ".blend":
@@ -80,7 +79,7 @@ def read(path):
 
 
 def write(path, items):
-    """Writes the objects to a mesh file, or everything to a .blend: all of it or nothing."""
+    """Writes the objects to a mesh file, or all data to a .blend; the output is replaced atomically."""
     check(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix.lower() == ".blend":
@@ -118,7 +117,7 @@ def export(path, items):
 
 
 def relative_textures(text, folder):
-    """Texture paths of a material file, told from the folder where it will lie."""
+    """The text of a material file, its texture paths relative to `folder`."""
 
     def relative(match):
         path = Path(match[2].strip())
@@ -130,9 +129,9 @@ def relative_textures(text, folder):
 
 
 def write_blend(path):
-    """Beside its place first, so that paths relative to the file hold.
+    """Writes a temporary file in the same folder, so that relative paths stay valid, and renames it.
 
-    It is read back: Blender 5.2 does not tell that a compressed file is cut short.
+    The file is read back: Blender 5.2 does not report a truncated compressed file.
     """
     from arapfields._files import whole_file
 

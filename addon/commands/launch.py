@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How to start another Blender like this one: a batch gives each file a process of its own."""
+"""Starts other Blender processes like this one, for the files of a batch."""
 
 import ctypes
 import os
@@ -10,13 +10,13 @@ from pathlib import Path
 
 from ..core.runtime.threads import start_thread
 
-# The descriptor of a pipe that closes when the batch ends, however it does; on Windows the batch's process.
+# Descriptor of a pipe that the system closes when the batch ends or is killed; on Windows the batch's ID.
 PARENT = "ARAPFIELDS_PARENT"
-PATIENCE = 5.0  # seconds in which a Blender that was asked to end may do so
+PATIENCE = 5.0  # seconds from the interrupt of a child until it is ended by force
 
 
 def end_with_parent():
-    """In a batch's child: ends this process when the batch is no more, even killed."""
+    """In a child of a batch: interrupts this process once the batch has ended or was killed."""
     try:
         parent = int(os.environ.pop(PARENT, ""))
     except ValueError:
@@ -29,8 +29,8 @@ def end_with_parent():
             try:
                 os.read(parent, 1)
             except OSError:
-                return  # not a batch's child after all
-        # An interruption, which leaves no partial file; os.kill would end the process at once on Windows.
+                return  # not a child of a batch
+        # An interrupt leaves no partial file; on Windows os.kill would end the process at once.
         if os.name == "nt":
             signal.raise_signal(signal.SIGTERM)
         else:
@@ -42,21 +42,21 @@ def end_with_parent():
 
 
 def wait_for_process(number):
-    """Returns once that process of Windows has ended."""
+    """Waits until a process ends, on Windows."""
     kernel, synchronize, ever = ctypes.WinDLL("kernel32"), 0x100000, 0xFFFFFFFF
     kernel.OpenProcess.restype = ctypes.c_void_p
-    process = kernel.OpenProcess(synchronize, False, number)  # none of one that is no more
+    process = kernel.OpenProcess(synchronize, False, number)  # None for a process that has ended
     kernel.WaitForSingleObject(ctypes.c_void_p(process), ever)
 
 
 class Launch:
-    """The way in which this Blender was started, to start others for single files."""
+    """The command with which this Blender was started, to start others."""
 
     def __init__(self, script=None):
         self.script = Path(script).resolve() if script else None
 
     def command(self, verb, arguments):
-        """The command line that runs a verb on one file."""
+        """The command line of a verb for one file."""
         import bpy
 
         from ..blender import host
@@ -74,7 +74,7 @@ class Launch:
         return [bpy.app.binary_path, *given[: at + 2], verb, *arguments]
 
     def environment(self, jobs):
-        """The processors shared between so many Blenders at work."""
+        """The environment of children, with the processors divided among `jobs` processes."""
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         threads = os.environ.get("OMP_NUM_THREADS") or str(max(1, cores // jobs))
         return {**os.environ, "OMP_NUM_THREADS": threads, "PYTHONUNBUFFERED": "1"}

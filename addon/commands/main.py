@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One command from its arguments to its exit code."""
+"""Runs a command and returns its exit code."""
 
 import contextlib
 import errno
@@ -25,7 +25,7 @@ def run(arguments, script=None):
     with interruptible():
         end_with_parent()
         try:
-            if options.verb != "check":  # which says in its report what is wrong
+            if options.verb != "check":  # reports a library that is missing itself
                 native.library()
             return verb(options.verb)(options, Launch(script))
         except KeyboardInterrupt:
@@ -36,7 +36,7 @@ def run(arguments, script=None):
 
 
 def verb(name):
-    """The function behind a verb; bpy is imported for single files alone."""
+    """The function of a verb; only verbs for one file import bpy."""
     module = name if name in ("batch", "check", "bake", "skin") else "single"
     return getattr(importlib.import_module(f".{module}", __package__), f"run_{module}")
 
@@ -48,10 +48,10 @@ def fail(reason, code):
 
 @contextlib.contextmanager
 def interruptible():
-    """Ctrl-C and SIGTERM raise KeyboardInterrupt: Blender catches the former for purposes of its own."""
+    """Context manager in which Ctrl-C and SIGTERM raise KeyboardInterrupt; Blender has its own handlers."""
     asked = [signal.SIGINT, signal.SIGTERM]
     if hasattr(signal, "SIGBREAK"):
-        asked.append(signal.SIGBREAK)  # Windows': how a batch asks (children.py)
+        asked.append(signal.SIGBREAK)  # on Windows, from a batch (children.py)
     before = [signal.signal(number, signal.default_int_handler) for number in asked]
     try:
         yield

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The verbs, their flags and their help; the solves' flags come from the tables that make the panel."""
+"""The verbs with flags and help; the flags of solves are made from the tables of parameters."""
 
 import argparse
 import re
@@ -13,14 +13,14 @@ from .one_line import OneLineParser
 
 FORMATS = ("ply", "obj", "stl", "blend")
 PARAMETERS = {"deform": DEFORM, "stylize": STYLIZE}
-FLAGS = {"deform": ("handles",), "stylize": ("style", "frame")}  # of one verb, beside its parameters
+FLAGS = {"deform": ("handles",), "stylize": ("style", "frame")}  # further flags of each verb
 SHARED = ("result", "surface", "resolution", "refine_thin", "quality")
-LONGEST = 1e7  # seconds; a wait cannot be much longer
+LONGEST = 1e7  # seconds; the system's waits have such a limit
 FILE = "file: .ply, .obj, .stl, or a .blend, in which each object's own settings and handles count"
 
 
 def parse(arguments):
-    """The parsed arguments; `solve` holds what was given of a solve's settings."""
+    """The parsed arguments; `solve` contains the settings of a solve that were given."""
     root = parser()
     options = root.parse_args(arguments)
     options.solve_verb = options.verb
@@ -36,7 +36,7 @@ def parse(arguments):
 
 
 def refuse_foreign(options, error):
-    """Calls `error` with a sentence where a flag belongs to the verb that the batch does not do."""
+    """Calls `error` if a flag belongs to the verb that this batch does not run."""
     other = "deform" if options.solve_verb == "stylize" else "stylize"
     known = {p.name for p in PARAMETERS[options.solve_verb]}
     foreign = [p.name for p in PARAMETERS[other] if p.name not in known]
@@ -46,7 +46,7 @@ def refuse_foreign(options, error):
 
 
 def solve_settings(options):
-    """What was given of the solve, by name: the same settings, the same result."""
+    """{name: value} of the given settings that determine a solve's result."""
     names = [*(p.name for p in PARAMETERS[options.solve_verb]), *FLAGS[options.solve_verb], *SHARED, *NAMES]
     return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
 
@@ -118,7 +118,7 @@ def add_skin(verbs):
 
 
 def frames(text):
-    """A flag's type: "a-b", frames of a scene, which may be negative."""
+    """Argument type "a-b": first and last frame, which may be negative."""
     match = re.fullmatch(r"(-?\d{1,7})-(-?\d{1,7})", text.strip())
     if not match or int(match[2]) < int(match[1]):
         raise argparse.ArgumentTypeError(f"{text[:40]!r} is not A-B, from frame A to B, such as 1-250")
@@ -145,7 +145,7 @@ def add_batch(verbs):
 
 
 def add_solve_flags(one, verbs):
-    """Flags of the solves; each defaults to None: to the object's own setting."""
+    """Adds the flags of solves; their default None is the object's setting."""
     add_contact_flags(one)
     group = one.add_argument_group("solve")
     if "stylize" in verbs:
@@ -173,7 +173,7 @@ def add_solve_flags(one, verbs):
 
 
 def lower(choices):
-    """What a flag takes, of choices whose identifiers are Blender's."""
+    """The values of a flag, the identifiers in lower case."""
     return [(choice if isinstance(choice, str) else choice[0]).lower() for choice in choices]
 
 
@@ -225,7 +225,7 @@ def seconds(text):
 
 
 def pattern(text):
-    """Of names within the folder."""
+    """Argument type: a pattern of names in the folder."""
     path = PurePath(text)
     if not path.parts or path.anchor or ".." in path.parts:
         raise argparse.ArgumentTypeError(f"{text!r} is not a pattern of names within the folder")
@@ -233,7 +233,7 @@ def pattern(text):
 
 
 def style(text):
-    """A style's native name; hyphens and underscores stand for blanks."""
+    """Argument type: a style's name, with hyphens or underscores for spaces."""
     name = text.lower().replace("-", " ").replace("_", " ")
     if name not in {known for known, _ in STYLES}:
         known = ", ".join(known for known, _ in STYLES)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a batch has done: a file an input, by which the next run, or another machine, knows what to skip."""
+"""Record of a batch: a file per input, from which later runs and other machines see what to skip."""
 
 import contextlib
 import hashlib
@@ -9,14 +9,12 @@ from pathlib import Path
 
 FOLDER = "arapfields-batch"
 VERSION = 2
-BATCH = (
-    "batch.json"  # what the folder's results have in common; an input's own file has a name with its suffix
-)
+BATCH = "batch.json"  # the settings of all results; the file of an input has the input's suffix in its name
 LOCK = "lock"
 
 
 def described(verb, settings, version):
-    """What is done to an input, as JSON; of files among the settings the content counts, not their names."""
+    """Verb, settings and version as JSON; files among the settings by their content, not their name."""
     description = {"version": version, "verb": verb}
     for name, value in sorted(settings.items()):
         is_file = isinstance(value, Path)
@@ -27,12 +25,12 @@ def described(verb, settings, version):
 
 
 def digest(content):
-    """A short name for what JSON can hold."""
+    """A short hash of a JSON value."""
     return hashlib.blake2b(json.dumps([VERSION, content]).encode(), digest_size=12).hexdigest()
 
 
 def differences(then, now):
-    """A phrase for what two descriptions do not share."""
+    """A phrase that names the differences of two descriptions."""
     names = [name for name in sorted({*then, *now}) if then.get(name) != now.get(name)]
     return ", ".join(
         f"{name} {then.get(name, 'unset')!s:.40} (now {now.get(name, 'unset')!s:.40})" for name in names
@@ -40,34 +38,34 @@ def differences(then, now):
 
 
 def stamp(path):
-    """What changes when a file does."""
+    """A value that changes when the file does."""
     status = path.stat()
     return [status.st_size, status.st_mtime_ns]
 
 
 class Record:
-    """The folder beside the results: a file an input, each written whole. Several batches may share it."""
+    """The record's folder beside the results: a file per input, replaced atomically; batches may share it."""
 
     def __init__(self, folder):
         self.folder = Path(folder) / FOLDER
         self._lock = None
 
     def place(self, name):
-        """Where the entry of an input is kept; a very long name is shortened."""
+        """The file of an input's entry; very long names are shortened."""
         path = self.folder / f"{name}.json"
         if len(os.fsencode(path.name)) > 240:
             path = path.with_name(f"{digest(name)}.json")
         return path
 
     def entry(self, name):
-        """What is noted of an input; nothing where that is damaged."""
+        """The entry of an input; empty if it is missing or damaged."""
         return read(self.place(name))
 
     def is_damaged(self, name):
         return self.place(name).exists() and not self.entry(name)
 
     def is_done(self, name, source, target, options):
-        """Whether the result is there, newer than its source, and made with the same options."""
+        """Whether the result exists, is newer than its source, and was made with the same options."""
         entry = self.entry(name)
         if entry.get("status") != "done" or entry.get("options") != options:
             return False
@@ -85,11 +83,11 @@ class Record:
         write_text(path, json_text({"format": VERSION, **content}, indent=1))
 
     def claim(self, name):
-        """Whether this process alone works on the input from now on; False while another one does.
+        """Claims an input for this process; False while another process holds it.
 
-        A lock of the system's, on a byte that the name chooses: it ends with the process, however that ends,
-        and reaches other machines where their folder is shared with locks. Without locks all claims are
-        granted: an input may then be done twice, with one result.
+        The claim is a system lock on one byte, chosen by the name: it ends with the process, and holds on
+        other machines if the shared file system supports locks. Without locks every claim is granted: an
+        input may then be processed twice, with the same result.
         """
         from arapfields._locks import lock
 
@@ -113,12 +111,12 @@ class Record:
         return self._lock
 
     def settings(self):
-        """What the folder's results are made with; None where nothing tells."""
+        """The settings of the folder's results; None if unknown."""
         settings = read(self.folder / BATCH).get("settings")
         return settings if isinstance(settings, dict) else None
 
     def agree(self, description, anew):
-        """What differs between these settings and those of the folder, which become these where `anew`."""
+        """How these settings differ from the folder's; stores them if it has none, or with `anew`."""
         from arapfields._locks import lock
 
         with contextlib.suppress(OSError):
@@ -139,14 +137,14 @@ class Record:
 
 
 def byte_of(name):
-    """A byte of the lock's file, which need not be as long."""
+    """The position of a name's byte in the lock file, which may be shorter."""
     return int.from_bytes(
         hashlib.blake2b(name.encode(errors="surrogateescape"), digest_size=7).digest(), "big"
     )
 
 
 def read(path):
-    """An object of a file; an empty one where there is none, or something else."""
+    """The JSON object of a file; {} if there is none."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):

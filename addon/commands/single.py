@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""deform and stylize: one file in, one file out, an outcome for each of its objects."""
+"""deform and stylize of one file, with an outcome for each of its objects."""
 
 import contextlib
 import json
@@ -24,7 +24,7 @@ from . import contact_flags, files, touching
 from .parser import solve_settings
 
 CALLS = {"deform": bpy.ops.arapfields.deform, "stylize": bpy.ops.arapfields.stylize}
-# What Blender puts before a message: the operator's name.
+# The operator's name, which Blender puts before a message.
 OPERATOR = re.compile(
     r"^Operator bpy\.ops\.\S+ |^Converting py args to operator properties: (:: )?|\b[A-Z]+_OT_\w+\."
 )
@@ -32,7 +32,7 @@ UPPER = ("result", "surface", "frame", "quality")
 
 
 def run_single(options, _):
-    """Exit code 0 when every object came out, 1 when some did; UserError when there is nothing to do."""
+    """Returns exit code 0 if all objects are solved, else 1; UserError if there are none to solve."""
     files.check(options.output)
     files.read(options.input)
     sources = objects_to_solve(options)
@@ -82,7 +82,7 @@ def objects_to_solve(options):
 
 
 def add_handles(source, path):
-    """Empties for the handles described in a JSON file, moved to their targets."""
+    """Adds the handles of a JSON file, and moves their Empties to the targets."""
     from arapfields.cli.handles import build_handles, read_handles
 
     af = native.library()
@@ -110,7 +110,7 @@ def add_handles(source, path):
 
 
 def solve(source, options):
-    """({"object", "status", "message", …}, (source, result) or None) of one object."""
+    """Solves one object; returns ({"object", "status", "message", …}, (source, result) or None)."""
     call = CALLS[options.solve_verb]
     given = solve_settings(options)
     for name in ("handles", *contact_flags.NAMES):
@@ -118,7 +118,7 @@ def solve(source, options):
     given |= {name: given[name].upper() for name in UPPER if name in given}
     if "style" in given:
         given["style"] = style_identifier(given["style"])
-    if "result" in given:  # the flag says what is made
+    if "result" in given:  # the flag determines the output
         given["output"] = given["result"]
     given["result"] = "NEW"
     if "quality" in given:
@@ -138,7 +138,7 @@ def solve(source, options):
 
 
 def failure(call, **given):
-    """Why an operator failed, in one line, or ""; KeyboardInterrupt where it was interrupted."""
+    """The message of an operator that failed, in one line, else ""; KeyboardInterrupt after an interrupt."""
     try:
         if call("EXEC_DEFAULT", **given) == {"CANCELLED"}:
             raise KeyboardInterrupt
@@ -149,7 +149,7 @@ def failure(call, **given):
 
 
 def finish_names(options, results):
-    """In a mesh file a result bears its source's name."""
+    """Gives results in a mesh file their sources' names."""
     if options.output.suffix.lower() == ".blend":
         return
     for source, item in results:
@@ -167,7 +167,7 @@ def write_json(path, content):
 
 @contextlib.contextmanager
 def progress(quiet):
-    """A bar on a terminal; a line now and then elsewhere."""
+    """Reports progress: a bar on a terminal, else a line now and then."""
     ended = threading.Event()
     live = sys.stderr.isatty()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""skin: the meshes of a .blend get weights of its armature's bones."""
+"""skin: skins the meshes of a .blend to its armature."""
 
 import sys
 
@@ -15,7 +15,7 @@ from .single import failure, objects_to_solve, progress
 
 
 def run_skin(options, _):
-    """Exit code 0 when the meshes are skinned, 1 when that failed."""
+    """Returns exit code 0 if the meshes are skinned, 1 if that failed."""
     for path in (options.input, options.output):
         if path.suffix.lower() != ".blend":
             raise UserError(f"{path}: is no .blend, which has meshes with an armature")
@@ -39,7 +39,7 @@ def run_skin(options, _):
 
 
 def rig_named(options):
-    """The armature of that name, or the only one."""
+    """The armature of that name; without a name the only one."""
     found = [item for item in bpy.context.view_layer.objects if item.type == "ARMATURE"]
     names = [item.name for item in found]
     wanted = [item for item in found if options.armature in (None, item.name)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Obstacles that flags name, beside what the objects of a .blend say themselves."""
+"""Obstacles and other contact settings from flags, in addition to the objects' own settings."""
 
 import math
 from pathlib import Path
@@ -13,7 +13,7 @@ from .files import READ
 
 
 def parts(text):
-    """(name, margin); a name may have a colon."""
+    """(name, margin) of "name:margin"; names may contain colons."""
     name, colon, margin = text.rpartition(":")
     try:
         value = float(margin)
@@ -27,12 +27,12 @@ def parts(text):
 
 
 def named(options):
-    """The names of the obstacles, which are not worked on themselves."""
+    """The names of the obstacles, which are not solved themselves."""
     return {parts(text)[0] for text in getattr(options, "obstacle", None) or ()}
 
 
 def set_contact(sources, options):
-    """Gives the sources what the flags ask for; each obstacle of a file is read once."""
+    """Applies the flags to the sources' contact settings; each obstacle file is read once."""
     obstacles = [(found(name, options), margin) for name, margin in map(parts, options.obstacle or ())]
     for source in sources:
         group = settings_of(source).contact
@@ -46,7 +46,7 @@ def set_contact(sources, options):
 
 
 def found(name, options):
-    """The object of that name, or the mesh of that file."""
+    """The object of that name, or the mesh of the file."""
     item, path = bpy.data.objects.get(name), Path(name)
     if item is None:
         if path.suffix.lower() not in READ or not path.is_file():

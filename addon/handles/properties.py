@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One handle of a source: its Empty and where that was at rest."""
+"""One handle of a source: its Empty or bone, and the rest box."""
 
 import bpy
 

@@ -26,7 +26,7 @@ class Display:
         self._progress_throttle, self._preview_throttle = RedrawThrottle(0.25), RedrawThrottle(0.4)
 
     def note_arrival(self):
-        """Called at a timer event; its delay measures the drawing cost."""
+        """Called at each timer event; the event's delay measures the time that redraws take."""
         late = time.monotonic() - self._left - TICK
         for throttle in (self._progress_throttle, self._preview_throttle):
             throttle.add_cost(late)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Modal operators with a timer, which run a job between the window's events."""
+"""Modal operators that run a job by a timer, between the window's events."""
 
 from ..blender.host import has_window
 from ..blender.language import translated
@@ -14,7 +14,7 @@ class Runs(set):
     """Coroutines of the running modal operators."""
 
     def clear(self):
-        """Ends them while their operators are there: Blender drops these with their class, unasked."""
+        """Closes them before their operators' classes are unregistered, which frees the operators."""
         while self:
             self.pop().close()
 
@@ -23,16 +23,16 @@ runs = Runs()
 
 
 class ModalRun:
-    """Mixin of operators with a `coroutine(context)` of what the main thread does for a job."""
+    """Mixin of operators with `coroutine(context)`, a job's work on the main thread."""
 
-    in_window = False  # whether it runs beside the window's events
+    in_window = False  # whether it runs modally in a window
 
     def invoke(self, context, event):
         if not has_window() or context.window is None:
             return self.execute(context)
         self.set_out(context)
         result = self.advance(context)
-        if result == {"RUNNING_MODAL"}:  # what ends at once is freed, with a handler of it left
+        if result == {"RUNNING_MODAL"}:  # the handler of an ended operator would outlive it
             context.window_manager.modal_handler_add(self)
         return result
 
@@ -44,7 +44,7 @@ class ModalRun:
 
     def modal(self, context, event):
         job = jobs.running()
-        if job is None:  # stopped from outside: a file is loaded, a step undone, the add-on disabled
+        if job is None:  # stopped by a file load, an undo, or the add-on's disabling
             self.leave()
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS":
@@ -55,7 +55,7 @@ class ModalRun:
         return self.advance(context)
 
     def advance(self, context):
-        """Does a slice of the main thread's work, and shows how far the job is."""
+        """Runs the coroutine for a while, and shows the job's progress."""
         display.note_arrival()
         try:
             finished = None if self.waits(context) else step_for(self._coroutine)
@@ -74,7 +74,7 @@ class ModalRun:
         return {"RUNNING_MODAL"}
 
     def waits(self, context):
-        """Whether the main thread's work has to wait until the window shows the job's own scene again."""
+        """Whether the window shows another scene than the job's, for which the coroutine waits."""
         job = jobs.running()
         if job is None or job.cancelled:
             return False
@@ -86,7 +86,7 @@ class ModalRun:
         display.show(context, job)
 
     def cancel(self, context):
-        """Blender ends the operator: its window closes or a file is loaded."""
+        """Called by Blender when the window closes or a file is loaded."""
         self.leave()
 
     def leave(self):

@@ -12,7 +12,7 @@ ICONS = {"INFO": "CHECKMARK", "WARNING": "ERROR", "ERROR": "CANCEL"}
 
 
 def draw_progress(layout, job):
-    """The running job: its progress bar with Cancel, its message, and its times."""
+    """The running job's progress bar with Cancel, message, elapsed and remaining time."""
     box = layout.box()
     progress_row(box.row(align=True), job)
     wrapped(box, job.message)
@@ -24,7 +24,7 @@ def draw_progress(layout, job):
 
 
 def remarks(source):
-    """What the user should know about how the source is read."""
+    """Texts about how the source is read."""
     if source is None:
         return
     shown = modifier_stack.shown_before(source, settings_of(source).in_place)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running job in the window's status bar: in sight whatever the sidebar shows."""
+"""The running job in the window's status bar, which is visible without the sidebar."""
 
 from ..blender.language import translated
 from ..core.runtime import jobs
@@ -7,7 +7,7 @@ from ..names import Op
 
 
 def draw(header, context):
-    """How far the job is, and the way out."""
+    """Draws the job's progress and a button that cancels it."""
     job = jobs.running()
     if job is None:
         return

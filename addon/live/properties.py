@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""object.arapfields.secondary: how a live source lags behind its handles, overshoots and settles."""
+"""object.arapfields.secondary: settings of secondary motion."""
 
 import bpy
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""scene.arapfields: settings of the pin tool, and kept poses."""
+"""scene.arapfields: settings of the pin tool, and stored poses."""
 
 import bpy
 

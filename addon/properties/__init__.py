@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is stored in the .blend: object.arapfields."""
+"""Properties of object.arapfields, which the .blend stores."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Choices that an object's settings hold and that a call of an operator may make otherwise."""
+"""Enum properties of an object's settings that an operator's arguments can override."""
 
 from functools import partial
 
@@ -40,12 +40,12 @@ def extraction(**extra):
 
 
 def result_properties():
-    """What is made and where it goes, as a call of an operator may say it otherwise than the settings."""
+    """The output and its place, as arguments of an operator that override the settings."""
     extra = {"options": {"SKIP_SAVE"}}
     return {
         "output": output(**extra),
         "surface": surface(**extra),
         "result": result(**extra),
-        "target": result(options={"SKIP_SAVE", "HIDDEN"}),  # the earlier name of `result`
+        "target": result(options={"SKIP_SAVE", "HIDDEN"}),  # the former name of `result`
         **extraction(**extra),
     }

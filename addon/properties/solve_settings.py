@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the three solves, made from the core's tables."""
+"""Settings of the three solves, made from the tables of core/settings."""
 
 import bpy
 

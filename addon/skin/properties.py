@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How meshes are skinned to an armature, kept with the armature."""
+"""Settings of skinning, stored with the armature."""
 
 import bpy
 

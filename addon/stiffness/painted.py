@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Painted stiffness as the library takes it: factors of the vertices."""
+"""Painted stiffness as arguments of the library: a factor per vertex."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from ..blender.object_references import settings_of
 from ..core.errors import refuse
 from ..core.runtime.coroutines import run_to_completion
 
-# name, label, tip: (times as stiff, times as stiff against bending)
+# {(identifier, label, tooltip): (factor of stretch stiffness, of bending stiffness)}
 PRESETS = {
     "SKIN": ("Skin", "Gives way: half as stiff, and easily bent", (0.5, 0.2)),
     "RUBBER": ("Rubber", "Stretches, and bends as the rest", (0.1, 10.0)),
@@ -17,7 +17,7 @@ PRESETS = {
 
 
 def refusal(source):
-    """Why the groups cannot be read, as a UserError; None where they can."""
+    """UserError that says why the groups cannot be read; else None."""
     mask = settings_of(source).stiffness.mask
     return vertex_groups.missing(source, [*names(source), *filter(None, [mask])])
 
@@ -27,13 +27,13 @@ def names(source):
 
 
 def pairs(source):
-    """(group, times as stiff), and the same against bending."""
+    """[(vertex group, factor)] of stretch and of bending stiffness."""
     settings = settings_of(source).stiffness
     return (settings.group, settings.times), (settings.bend_group, settings.bend_times)
 
 
 def read(context, source, in_place):
-    """((n,) factors of the vertices' stiffness, (n,) of that against bending); None each where all are 1."""
+    """(n,) factors of stretch and of bending stiffness of the vertices; None instead of all ones."""
     refuse(refusal(source))
     return of_weights(
         source, run_to_completion(vertex_groups.read_weights(context, source, names(source), in_place))
@@ -49,7 +49,7 @@ def of_weights(source, weights):
 
 
 def factors(weights, times):
-    """From 1 where the weight is 0 to `times` where it is 1, evenly in proportion."""
+    """Factors interpolated geometrically by the weights, from 1 at weight 0 to `times` at weight 1."""
     return np.power(float(times), np.asarray(weights, dtype=np.float64))
 
 

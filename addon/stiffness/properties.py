@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a source's painted stiffness is."""
+"""Settings of a source's painted stiffness."""
 
 import bpy
 
 from ..blender.property_definitions import number, tells, text
 
-MOST = 1e4  # how many times as stiff a part may be; single precision bears no more beside soft ones
+MOST = 1e4  # largest factor; single precision does not allow a larger ratio
 
 
 def factor(name, description):

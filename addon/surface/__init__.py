@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The source: its implicit surface, fitted and extracted, and its samples."""
+"""The source's implicit surface, exact or fitted, its samples and its extraction."""

@@ -82,7 +82,7 @@ class ARAPFIELDS_PT_surface(Advanced, bpy.types.Panel):
 
 
 def errors(report):
-    """How far a fit is off, from the figures that its report has."""
+    """Yields texts with the errors of a fit's report."""
     if "near_mean" in report:
         yield translated("Mean error at the surface: {value}", value=f"{report['near_mean']:.2g}")
     if "near_max" in report:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A source's points where the modifiers before the field have them, which may be off the surface at rest.
+"""Points of a source as the modifiers before the field move them, possibly off the surface at rest.
 
-A field is solved on that surface and means little off it. So each point goes where the field takes its point
-at rest, and its offset from there turns along with the field:
+A field is solved on the surface at rest and is inaccurate off it. So each point follows its rest point r, and
+its offset from r rotates with the field:
 
     y = f(r) + c + R (p - r - c),  R the rotation of f's Jacobian at r, c the median offset.
 
-What has moved as a whole, by c, keeps its shape, however far it is.
+A translation c of all points is left out of the offsets, so that it does not rotate.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..core.geometry import rotations
 
 
 class PointsBefore:
-    """(n, 3) points of a SourceSurface: `local`, and the same `now` in solve space."""
+    """Points of a SourceSurface before the field: (n, 3) `local`, in solve space `now`, and `rest`."""
 
     def __init__(self, surface, local):
         self.local, self.rest, self.now = local, surface.vertices, surface.vertices
@@ -37,18 +37,18 @@ class PointsBefore:
         return self.now is self.rest
 
     def beside(self, points):
-        """PointsBeside of (k, 3) points in solve space."""
+        """A PointsBeside for (k, 3) points in solve space."""
         return PointsBeside(self, points)
 
     def turns(self, field):
-        """(turned, 3) by how much more than at rest those go that turn: (R - 1) (p - r - c)."""
+        """(k, 3) displacements (R - 1) (p - r - c) of the points `turned`, those with an offset."""
         if self._of[0] is not field:
             turns = rotations.closest(field.jacobian(self.rest[self.turned]))
             self._of = field, np.einsum("nij,nj->ni", turns - np.eye(3), self._offsets)
         return self._of[1]
 
     def moved(self, solved, field):
-        """(n, 3) where they go, by where a field takes those at rest; those it leaves stay bit for bit."""
+        """(n, 3) moved points; `solved`: the rest points moved by the field."""
         if self.is_at_rest:
             return solved
         after = self.now.astype(solved.dtype) + (solved - self.rest.astype(solved.dtype))
@@ -58,15 +58,15 @@ class PointsBefore:
 
 
 class PointsBeside:
-    """(k, 3) points of others beside the surface as it is now, which go the way of its nearest points."""
+    """(k, 3) points near the surface before the field, which follow its nearest vertices."""
 
     def __init__(self, before, points):
         self.before, self._near = before, NearestVertices(before.now, points)
         self._offsets = self._blend(before.now - before.rest)
-        self.at_rest = points - self._offsets  # beside the surface at rest
+        self.at_rest = points - self._offsets  # near the surface at rest
 
     def moved(self, solved, field):
-        """(k, 3) where they go, by where the body at rest takes those at rest."""
+        """(k, 3) moved points; `solved`: the points `at_rest` moved by the field."""
         turns = np.zeros_like(self.before.rest)
         if self.before.needs_field:
             turns[self.before.turned] = self.before.turns(field)

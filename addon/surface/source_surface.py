@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The work of one object, read on the main thread and run on the worker: surface, samples, extraction."""
+"""One source's surface, samples and extraction: read on the main thread, computed on the worker."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,21 +23,21 @@ from .surface_fit import SurfaceFit, read_fit
 
 @dataclass(frozen=True)
 class SourceSurface:
-    """A source in solve space: its mesh, and its implicit surface, that of the triangles or a fit of them."""
+    """A source in solve space: its mesh, and its implicit surface, exact or fitted."""
 
     reference: ObjectReference
     space: Space
-    local: np.ndarray  # (n, 3) vertices of the shape that is worked on
+    local: np.ndarray  # (n, 3) vertices of the shape to solve
     vertices: np.ndarray  # (n, 3) the same in solve space
     triangles: np.ndarray
     fit: SurfaceFit
-    in_place: bool  # the shape at the place of the field's modifier, not all that is shown
+    in_place: bool  # whether the shape is that at the field modifier's place, without later modifiers
     has_free_normals: bool
-    exact: bool  # whether the implicit surface is the triangles', or a fit of them
-    stiffness: tuple  # (n,) factors of the vertices' stiffness, and of that against bending; None for 1
-    solids: list  # (vertices, triangles) of what is sampled with it
-    splats: Splats | None = None  # the vertices' own
-    shown: tuple | None = None  # ((m, 3) places on it, (m, 3) where they are seen), where it is subdivided
+    exact: bool  # whether the implicit surface is the mesh's signed distance instead of a fit
+    stiffness: tuple  # (n,) factors of stretch and of bending stiffness of the vertices; None: all 1
+    solids: list  # (vertices, triangles) of carried meshes to sample as well
+    splats: Splats | None = None  # attributes of the vertices
+    shown: tuple | None = None  # ((m, 3) points of the surface, (m, 3) shown) of a subdivided one
 
     @cached_property
     def _exact_surface(self):
@@ -49,15 +49,15 @@ class SourceSurface:
         return native.library().PreparedSplats(self.splats.made(native.library()))
 
     def splat_changes(self, field):
-        """(n, 3) splats' centers that a field moves, and {attribute: what is added to it}; or None, None."""
+        """(n, 3) moved centers of splats and {attribute: its change}; (None, None) without splats."""
         return (None, None) if self.splats is None else self.splats.changes(self.prepared, field)
 
     def implicit(self, tracker, weight):
-        """The implicit surface that was chosen; runs on the worker."""
+        """The chosen implicit surface; on the worker."""
         return self._exact_surface if self.exact else self.fit.surface(tracker, weight)
 
     def samples(self, tracker, count, seed, own_triangles):
-        """Points spread evenly over the implicit surface, or over all of the mesh's own triangles."""
+        """Uniform samples of the implicit surface, or with `own_triangles` of the mesh."""
         af = native.library()
         if self.splats is not None:
             task = tracker.start("Sampling", 0.15)
@@ -75,7 +75,7 @@ class SourceSurface:
         return af.sample_mesh(self.vertices, self.triangles, count=count, seed=seed, **weights)
 
     def with_stiffness(self, samples):
-        """Samples of an implicit surface, as stiff as the vertices near them."""
+        """Samples of an implicit surface with the stiffness of their nearest vertices."""
         if all(factors is None for factors in self.stiffness):
             return samples
         near = NearestVertices(self.vertices, samples.points)
@@ -83,9 +83,9 @@ class SourceSurface:
         return samples.with_weights(*weights)
 
     def turns(self, field, points, place=None):
-        """(n, 3) how a field turns free custom normals at points in solve space; None: there are none.
+        """(n, 3) rotation vectors of free custom normals at points in solve space; None without such normals.
 
-        `place`: the (4, 4) part of the motion that the object itself takes.
+        `place`: the (4, 4) part of the motion that becomes the object's transform.
         """
         if not self.has_free_normals:
             return None
@@ -97,7 +97,7 @@ class SourceSurface:
     def extract(self, tracker, weight, **extraction):
         """(k, 3) vertices and the topology of the implicit surface, in solve space.
 
-        `extraction`: the library's resolution and refine_thin; `weight`: of a fit in what is left to do.
+        `extraction`: the library's resolution and refine_thin; `weight`: the fit's share of the progress.
         """
         sdf = self.implicit(tracker, weight)
         mesh = native.library().extract_surface(sdf, **extraction, task=tracker.start("Extracting", 1.0))
@@ -105,7 +105,7 @@ class SourceSurface:
         return checked_mesh(*mesh)
 
     def extract_moved(self, tracker, field, **extraction):
-        """The same of the surface where the field moves it, by marching cubes there; and a report."""
+        """The same of the deformed surface, by marching cubes in deformed space; and figures of a report."""
         sdf, task = self.implicit(tracker, 0.0), tracker.start("Extracting", 1.0)
         mesh = native.library().extract_deformed(sdf, field, **extraction, task=task)
         warn_of_pieces(tracker, mesh.report)
@@ -131,7 +131,7 @@ def checked_mesh(vertices, corners):
 
 
 def in_world_shape(splats, space, source):
-    """Splats, if any; UserError where the object's scale stretches them."""
+    """Returns the splats, or None; UserError if the object's scale would stretch them."""
     if splats is not None and not np.array_equal(space.local_to_solve, np.eye(4)):
         raise UserError("{name}: its scale stretches splats; apply the scale, or make it uniform", source)
     return splats
@@ -140,12 +140,12 @@ def in_world_shape(splats, space, source):
 def read_surface(
     context, source, in_place=False, *, exact=None, fit_operator=None, carrying=None, frame=None, space=None
 ):
-    """All of a source that the worker needs; UserError when it cannot be worked on. Main thread.
+    """The SourceSurface of an object; UserError if it cannot be read. Main thread.
 
-    `exact` and the arguments of `fit_operator` count before the object's settings. `carrying`
-    (carried/carrying.py) is given for a solve: the samples are then as stiff as the source is painted, and
-    spread over what is carried together with it. `frame`: another than that at hand, whose shape is read.
-    `space`: the solve space, where that is not what the object's matrix at hand says.
+    `exact` and the arguments of `fit_operator` override the object's settings. With `carrying`
+    (carried/carrying.py), for a solve, painted stiffness is read, and carried meshes are sampled as well.
+    `frame`: the frame to read, by default the current one. `space`: the solve space, by default that of the
+    object's present matrix.
     """
     context.view_layer.update()
     mesh, settings = mesh_arrays.read(context, source, in_place, frame), settings_of(source)

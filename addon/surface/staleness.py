@@ -14,7 +14,7 @@ changed = set()  # session_uid of objects whose geometry was updated since their
 
 
 def options_text(settings):
-    """The fit's settings of an object, comparable."""
+    """The settings of an object's fit as a comparable text."""
     return json.dumps(sorted(native_options("fit", fit_values(settings.fit, None)).items()))
 
 

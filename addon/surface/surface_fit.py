@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The neural implicit surface fitted to a source's triangles, cached on disk."""
+"""The neural implicit surface fitted to a source's mesh, cached on disk."""
 
 from functools import cached_property
 
@@ -11,11 +11,11 @@ from ..core.runtime import native
 from ..core.runtime.fit_cache import fit_key
 from ..core.settings.parameters import FIT, QUALITIES, native_options
 
-VERSION = 1  # raised whenever fits of older versions must not be used
+VERSION = 1  # increased when fits of earlier versions must not be used
 
 
 class SurfaceFit:
-    """A fit of (n, 3) vertices and (m, 3) triangles with these options; made on a worker, once."""
+    """A fit of (n, 3) vertices and (m, 3) triangles with these options; computed once, on a worker."""
 
     def __init__(self, vertices, triangles, options, machine, cache):
         self.vertices, self.triangles, self.options = vertices, triangles, options
@@ -31,7 +31,7 @@ class SurfaceFit:
         return self._cache.path(self.key).exists()
 
     def surface(self, tracker, weight, again=False):
-        """The fitted surface, from the cache unless it is to be made `again`."""
+        """The fitted surface, from the cache unless `again` is set."""
         if self._surface is None:
             cached = None if again else self._cache.load(self.key, native.library().NeuralSdf.load)
             self._surface = self._fitted(tracker, weight) if cached is None else cached
@@ -56,7 +56,7 @@ def read_fit(settings, operator, vertices, triangles):
 
 
 def fit_values(group, operator):
-    """The fit's effective settings; an operator's `quality` overrides the object's single settings."""
+    """The effective settings of the fit; an operator's `quality` overrides the object's other settings."""
     values = effective_values(FIT, group, operator)
     if operator is not None and operator.properties.is_property_set("quality"):
         preset = QUALITIES[operator.quality][2]
