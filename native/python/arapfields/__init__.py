@@ -4,7 +4,7 @@
 Arrays are NumPy, all coordinates are the mesh's own; distances are negative inside.
 """
 
-from . import _loading as _loading  # first, since the rest needs the native module
+from . import _loading as _loading  # first: the other modules import the native module
 from ._copying import register as _register_copies
 from ._native import (
     Attachment,
@@ -107,7 +107,7 @@ from .reports import (
 
 _register_copies(globals())
 
-# The shorter and the older names.
+# Shorter and former names.
 Cuboid = CuboidHandle
 Point = PointHandle
 Region = RegionHandle

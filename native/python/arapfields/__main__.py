@@ -7,11 +7,11 @@ import sys
 from ._native import Cancelled, Diverged, InvalidInput
 from .cli.parser import parse
 
-DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # nothing that another input would mend
+DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # not errors of the input
 
 
 def main(arguments=None):
-    """Runs one verb and returns the exit code; errors are one line on stderr."""
+    """Runs a verb and returns the exit code; errors are printed as one line on stderr."""
     verb = "arapfields"
     try:
         options = parse(sys.argv[1:] if arguments is None else arguments)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What reports say of contact."""
+"""Classes of reports on contact."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from ._report import Report
 
 @dataclass(frozen=True, kw_only=True)
 class HeldBack(Report):
-    """A handle that contact keeps from its target."""
+    """A handle that contact prevents from reaching its target."""
 
     handle: int
     by: str
@@ -19,7 +19,7 @@ class HeldBack(Report):
 
 @dataclass(frozen=True, kw_only=True)
 class ContactReport(Report):
-    """How a surface touches."""
+    """Contact of a solved surface."""
 
     deepest: float
     """How far a sample is beyond an obstacle's margin, in mesh units."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Options, handles and frames are copied and pickled by what makes them, fields and networks as files."""
+"""Copying and pickling: options, handles and frames by their constructors' arguments, fields as files."""
 
 import copyreg
 import functools
@@ -40,7 +40,7 @@ def restored(kind: Any, content: bytes) -> Any:
 
 
 def register(classes: dict[str, Any]) -> None:
-    """`classes` are those of the package, by name."""
+    """Registers the functions that pickle; `classes`: {name: class} of the package."""
     for name, kind in classes.items():
         if name in NAMES or name.endswith("Options"):
             copyreg.pickle(kind, reduced)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Outputs that appear whole or not at all, and reports as JSON. Every file of ours is written by these."""
+"""Atomic output files, and JSON. The package writes all files by these functions."""
 
 import codecs
 import contextlib
@@ -16,11 +16,11 @@ from ._native import InvalidInput, OutputFile
 
 @contextlib.contextmanager
 def whole_file(path, beside=False):
-    """The path of a file to write, which becomes `path` when the block ends without an error.
+    """Context manager: a temporary path, renamed to `path` if the block ends without an error.
 
-    It lies in a temporary folder, or `beside` its place for content with paths relative to it. At the end it
-    is brought to the disk, looked at, and renamed; see OutputFile. OSError, also of what the block raises,
-    names `path`; InvalidInput where `path` holds something else than a regular file.
+    The file is in a temporary folder, or `beside` its place for content with relative paths. It is synced and
+    checked before it is renamed; see OutputFile. OSErrors, also of the block, name `path`; InvalidInput if
+    `path` is not a regular file.
     """
     output = OutputFile(path)
     try:
@@ -33,7 +33,7 @@ def whole_file(path, beside=False):
 
 @contextlib.contextmanager
 def naming(output, path):
-    """An OSError of the block that names no file, or the output's temporary one, names `path` instead."""
+    """Context manager: OSErrors without a file name, or with the temporary one, name `path` instead."""
     try:
         yield
     except OSError as error:
@@ -45,21 +45,20 @@ def naming(output, path):
 
 
 def read_text(path, errors="strict"):
-    """The text of a file in UTF-8, also with the byte order mark that Windows' programs put first, or in
-    UTF-16 with one."""
+    """The text of a file in UTF-8, with or without a byte order mark, or in UTF-16 with one."""
     with open(path, "rb") as file:
         is_wide = file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
     return Path(path).read_text(encoding="utf-16" if is_wide else "utf-8-sig", errors=errors)
 
 
 def write_text(path, text):
-    """Writes UTF-8, whole or not at all."""
+    """Writes a text file in UTF-8, atomically."""
     with whole_file(path) as partial:
         partial.write_text(text, encoding="utf-8", errors="surrogateescape")
 
 
 def write_arrays(file, **arrays):
-    """Writes a NumPy archive, as np.savez does, which tells nobody where its end cannot be written."""
+    """Writes a NumPy archive, as np.savez, which does not report that a file's end cannot be written."""
     with zipfile.ZipFile(file, "w", allowZip64=True) as archive:
         for name, array in arrays.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
@@ -67,7 +66,7 @@ def write_arrays(file, **arrays):
 
 
 def json_text(value, indent=None):
-    """JSON of dicts, lists, numbers and arrays. NaN and infinities, which JSON has not, become null."""
+    """JSON of dicts, lists, numbers and arrays. NaN and infinities, which JSON lacks, become null."""
     try:
         return json.dumps(_plain(value), indent=indent, allow_nan=False)
     except (TypeError, ValueError, RecursionError) as error:
@@ -87,7 +86,7 @@ def _plain(value):
 
 
 def existing_file(path, suffixes=()):
-    """The path of an input; InvalidInput for what is no regular file or has another extension."""
+    """The path of an input; InvalidInput if it is not a regular file or has another extension."""
     path = Path(path)
     if path.is_dir():
         raise InvalidInput(f"{path}: is a directory, not a file")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blocks of code that Ctrl-C does not break off, since what they call would take it for another failure."""
+"""Code that Ctrl-C does not interrupt, as the functions it calls report an interrupt as another error."""
 
 import contextlib
 import signal
@@ -8,10 +8,10 @@ import threading
 
 @contextlib.contextmanager
 def uninterrupted():
-    """Ctrl-C during the block takes effect at its end.
+    """Context manager that defers Ctrl-C to the end of the block.
 
-    Not on other threads, nor where the program that embeds Python has a handler of its own, as Blender
-    without a window does: Python cannot put that back, and it raises nothing.
+    It does nothing on other threads, or if the program that embeds Python has installed a handler in C, as
+    Blender without a window does: Python cannot restore that one, and it raises no KeyboardInterrupt.
     """
     is_main = threading.current_thread() is threading.main_thread()
     if not is_main or signal.getsignal(signal.SIGINT) is None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the torch beside this package is the one that its library was built against.
+"""Checks that the installed torch has the version that the library was built against.
 
-libtorch's C++ interface changes from version to version: with another one the library fails to load at best,
-and crashes at worst. So the versions are compared before anything is loaded.
+The ABI of libtorch changes between versions: with another version the library fails to load or crashes. So
+versions are compared before the library is loaded.
 """
 
 from importlib import metadata
@@ -12,7 +12,7 @@ HERE = Path(__file__).parent
 
 
 def check(folder: Path = HERE) -> None:
-    """ImportError, in one line, where the installed torch is missing or not the one built against."""
+    """ImportError in one line if torch is missing or has another version."""
     noted = folder / "libtorch.txt"
     built_against = noted.read_text(encoding="utf-8").strip() if noted.is_file() else ""
     if not built_against:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Loads the native module once torch is the right one. Ctrl-C meanwhile is no failed import."""
+"""Loads the native module after checking torch's version; Ctrl-C during the import is deferred."""
 
 from ._interrupts import uninterrupted
 from ._libtorch import check

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Locks between processes, on single bytes of an open file. They end with the process, however it ends."""
+"""Locks between processes on single bytes of an open file; the system releases them with the process."""
 
 import contextlib
 import errno
@@ -13,16 +13,16 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-PAUSE = 0.05  # seconds between tries, where the system does not wait itself
-# Windows takes positions of 32 bits; the byte need not exist. There nobody else reads what is locked: the
-# default lies behind what a file holds.
+PAUSE = 0.05  # seconds between attempts on Windows, which has no blocking call
+# Windows takes positions of 32 bits; the byte need not exist. Others cannot read a locked byte there: the
+# default is beyond the end of files.
 LARGEST = 2**31 - 1
-POSITION = threading.Lock()  # Windows locks at the file's position, which threads share
+POSITION = threading.Lock()  # Windows locks at the file position, which threads share
 
 
 def lock(file, byte=LARGEST, wait=True):
-    """Takes a byte's lock. PermissionError or BlockingIOError where another process has it and `wait` is off,
-    OSError where the file system has no locks."""
+    """Locks a byte. PermissionError or BlockingIOError if another process has locked it and `wait` is False,
+    OSError if the file system does not support locks."""
     if sys.platform != "win32":
         fcntl.lockf(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB), 1, byte)
         return
@@ -31,7 +31,7 @@ def lock(file, byte=LARGEST, wait=True):
             set_lock(file, byte, msvcrt.LK_NBLCK)
             return
         except OSError as error:
-            if error.errno not in (0, errno.EACCES):  # 0: Wine gives no reason
+            if error.errno not in (0, errno.EACCES):  # 0: from Wine
                 raise
             if not wait:
                 raise PermissionError(errno.EACCES, "another process has the lock") from error
@@ -39,7 +39,7 @@ def lock(file, byte=LARGEST, wait=True):
 
 
 def unlock(file, byte=LARGEST):
-    """Gives it back; nothing where that cannot be."""
+    """Unlocks a byte; errors are ignored."""
     with contextlib.suppress(OSError):
         if sys.platform != "win32":
             fcntl.lockf(file, fcntl.LOCK_UN, 1, byte)
@@ -48,7 +48,7 @@ def unlock(file, byte=LARGEST):
 
 
 def set_lock(file, byte, mode):
-    """Windows' own, without waiting."""
+    """Locks or unlocks a byte on Windows, without waiting."""
     with POSITION:
         os.lseek(file.fileno(), byte & LARGEST, os.SEEK_SET)
         msvcrt.locking(file.fileno(), mode, 1)

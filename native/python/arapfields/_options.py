@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The options of every operation: what native/options/options.toml gave when the library was built."""
+"""The options of every operation, from native/options/options.toml as of the build."""
 
 import json
 from pathlib import Path
@@ -9,11 +9,11 @@ TABLE: dict[str, Any] = json.loads(Path(__file__).with_name("options.json").read
 
 
 def presets_of(operation: str) -> dict[str, dict[str, Any]]:
-    """Name → label, sentence and values of an operation's presets."""
+    """{name: label, sentence and values} of an operation's presets."""
     return dict(TABLE[operation]["presets"])
 
 
 def options_of(operation: str) -> dict[str, dict[str, Any]]:
-    """Name → declaration (type, default, low, high, sentence, …) of an operation's options, in order."""
+    """{name: declaration (type, default, low, high, sentence, …)} of an operation's options, in order."""
     block = TABLE[operation]
     return {option["name"]: option for option in (*block["options"], *block["further"])}

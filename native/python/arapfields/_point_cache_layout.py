@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What stands at the beginning of a point cache's file, PC2 or MDD, and how long it must be."""
+"""Headers and sizes of point cache files, PC2 and MDD."""
 
 import math
 import struct
@@ -14,12 +14,12 @@ SUFFIXES = (".pc2", ".mdd")
 PC2_HEADER = struct.Struct("<12s2i2fi")
 PC2_MAGIC, PC2_VERSION = b"POINTCACHE2\0", 1
 MDD_HEADER = struct.Struct(">2i")
-MOST = 2**31 - 1  # what an int32 counts
+MOST = 2**31 - 1  # largest int32
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Of a file: `frames` samples of `points` points."""
+    """Layout of a file with `frames` samples of `points` points."""
 
     suffix: str
     points: int
@@ -40,7 +40,7 @@ class Layout:
 
     @property
     def type(self) -> np.dtype[np.float32]:
-        """Of the coordinates."""
+        """Data type of the coordinates."""
         return np.dtype("<f4" if self.pc2 else ">f4")
 
     @property
@@ -49,16 +49,16 @@ class Layout:
 
     @property
     def begin(self) -> int:
-        """Where the first sample lies."""
+        """Position of the first sample, in bytes."""
         return PC2_HEADER.size if self.pc2 else MDD_HEADER.size + 4 * int(self.frames)
 
     @property
     def size(self) -> int:
-        """The whole file's size."""
+        """Size of the file, in bytes."""
         return self.begin + self.sample_bytes * int(self.frames)
 
     def header(self, start: float, step: float, fps: float) -> bytes:
-        """What comes before the first sample."""
+        """All bytes before the first sample."""
         start, step = number("start", start), number("step", step, positive=True)
         if self.pc2:
             return PC2_HEADER.pack(PC2_MAGIC, PC2_VERSION, self.points, start, step, self.frames)
@@ -71,7 +71,7 @@ class Layout:
 
 
 def layout_of(suffix: str, beginning: bytes, size: int) -> Layout:
-    """A file's layout from its beginning and its size; InvalidInput where these do not go together."""
+    """The layout of a file by its first bytes and its size; InvalidInput if they contradict each other."""
     pc2 = suffix == ".pc2"
     kind = PC2_HEADER if pc2 else MDD_HEADER
     if len(beginning) < kind.size:
@@ -90,7 +90,7 @@ def layout_of(suffix: str, beginning: bytes, size: int) -> Layout:
 
 
 def times_of(layout: Layout, beginning: bytes) -> npt.NDArray[np.float64]:
-    """Each sample's frame (PC2) or seconds (MDD), from all that comes before the first sample."""
+    """Frame (PC2) or seconds (MDD) of each sample; `beginning`: all bytes before the first sample."""
     if layout.pc2:
         start, step = PC2_HEADER.unpack(beginning)[3:5]
         times = float(start) + float(step) * np.arange(layout.frames)
@@ -102,7 +102,7 @@ def times_of(layout: Layout, beginning: bytes) -> npt.NDArray[np.float64]:
 
 
 def number(name: str, value: float, positive: bool = False) -> float:
-    """The number as single precision keeps it."""
+    """The number rounded to single precision; InvalidInput if it is not finite there."""
     try:
         kept = float(np.float32(value)) if abs(value) < 3e38 else math.nan
     except (TypeError, ValueError):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The base class of reports, and what a callback receives while a solve runs."""
+"""The base class of reports, and the argument of callbacks."""
 
 import dataclasses
 import json
@@ -32,7 +32,7 @@ class Report:
         return tuple(field.name for field in dataclasses.fields(cls))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers, texts, lists and dicts by name."""
+        """{name: value}, values of plain types: numbers, strings, lists and dicts."""
         plain: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(self)))
         return plain
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reports as files keep them."""
+"""Reports as JSON in files."""
 
 import dataclasses
 import functools
@@ -12,16 +12,16 @@ from .reports import Report, SolveReport
 
 
 def to_json(report: Report | None) -> str:
-    """A report, with its kind, as a file keeps it."""
+    """JSON of a report and its kind."""
     if report is None:
         return "{}"
     return json_text({"kind": type(report).__name__, **dataclasses.asdict(report)})
 
 
 def from_json(text: str) -> Report | None:
-    """What to_json wrote, or a report of a file from before kinds were written.
+    """The report of a JSON text of to_json, or of files from before the kind was written.
 
-    None for an empty one and for what another program wrote; ValueError for one of ours that does not fit.
+    None for an empty report or one of another program; ValueError if fields do not match the kind.
     """
     found = json.loads(text)
     if not isinstance(found, dict):
@@ -48,7 +48,7 @@ def _kind_of(found: dict[str, Any]) -> str:
 
 
 def _restored(kind: type[Report], name: str, value: Any) -> Any:
-    """A field's value from JSON, where NaN and infinity are null and tuples are lists."""
+    """The value of a field from JSON, in which NaN and infinity are null and tuples are lists."""
     declared = _declared(kind).get(name, object)
     try:
         return _typed(value, declared)
@@ -62,7 +62,7 @@ def _declared(kind: type[Report]) -> dict[str, Any]:
 
 
 def _typed(value: Any, declared: Any) -> Any:
-    """The value as the annotation says, or TypeError."""
+    """The value converted to the annotated type; TypeError if that is impossible."""
     origin, inner = get_origin(declared), get_args(declared)
     if origin is tuple and isinstance(value, list):
         if inner[-1] is Ellipsis:

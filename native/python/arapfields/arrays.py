@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the functions take, as type checkers see it."""
+"""Types of array arguments, for type checkers."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
@@ -9,13 +9,13 @@ import numpy.typing as npt
 
 
 class SupportsArray(Protocol):
-    """Arrays, and what makes one of itself."""
+    """Objects with `__array__`, such as NumPy arrays."""
 
     def __array__(self) -> npt.NDArray[Any]: ...
 
 
 class SupportsDLPack(Protocol):
-    """Memory that is shared by DLPack, such as a tensor's."""
+    """Objects that share memory by DLPack, such as tensors."""
 
     def __dlpack__(self) -> Any: ...
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Number: TypeAlias = float | np.floating[Any] | np.integer[Any]
     Flat: TypeAlias = SupportsArray | SupportsDLPack | Buffer | Sequence[Number]
-    # Not numpy's own alias, which takes texts too.
+    # Not numpy's ArrayLike, which includes strings.
     ArrayLike: TypeAlias = Flat | Sequence[Flat] | Sequence[Sequence[Flat]]
     """NumPy arrays, nested sequences, and what has the buffer protocol, DLPack or `__array__`."""
 else:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the C++ package inside of this one is."""
+"""The place of the C++ package inside this package."""
 
 from pathlib import Path
 
@@ -7,9 +7,9 @@ from ._native import InvalidInput
 
 
 def cmake_dir() -> str:
-    """The folder of arapfieldsConfig.cmake, what CMake's variable arapfields_DIR is to be, as a str.
+    """The folder of arapfieldsConfig.cmake as a str, the value of CMake's variable arapfields_DIR.
 
-    InvalidInput where the package was installed without its C++ part, as in Blender's extension.
+    InvalidInput if the package was installed without its C++ part, as in Blender's extension.
     """
     folder = Path(__file__).parent / "share" / "cmake" / "arapfields"
     if not (folder / "arapfieldsConfig.cmake").is_file():

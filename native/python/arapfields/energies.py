@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Energies of one's own: what deform and stylize ask of them."""
+"""Base class and types of custom energies for deform and stylize."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Jets:
 
 
 class EnergyValue(NamedTuple):
-    """An energy's value and its derivatives by the jets that it was given; None where it does not look."""
+    """An energy's value and its derivatives by the jets; None for derivatives that are zero."""
 
     value: float
     values: ArrayLike | None = None
@@ -47,9 +47,9 @@ class EnergyValue(NamedTuple):
 class Energy(ABC):
     """A term of the loss, written in Python: `deform(samples, handles, options, energies=[mine])`.
 
-    Each iteration calls it with the jets at that iteration's samples; what it returns joins the loss with
-    weight 1. A mean over the samples keeps its meaning whatever their number; a plain function of the jets
-    does where order 1 is enough.
+    It is called in each iteration with the jets at that iteration's samples; its value is added to the loss
+    with weight 1. Use a mean over the samples to be independent of their number. For order 1, a plain
+    function of the jets is enough.
     """
 
     order: int = 1

@@ -18,9 +18,9 @@ from ._options import options_of
 from .arrays import ArrayLike
 
 SUFFIXES = (".npz", ".vdb")
-CHUNK = 200_000  # points evaluated between two looks at the task
+CHUNK = 200_000  # points evaluated between two checks for cancellation
 RESOLUTION = options_of("grid")["resolution"]
-BAND = 3  # voxels on either side of the surface that a level set keeps
+BAND = 3  # half width of the level set's narrow band, in voxels
 
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -28,7 +28,7 @@ FilePath: TypeAlias = str | os.PathLike[str]
 
 
 class Distance(Protocol):
-    """A function of points (p, 3) → (p,) with the frame of its surface."""
+    """A function of points (p, 3) → (p,) with a `frame`."""
 
     @property
     def frame(self) -> Frame: ...
@@ -37,7 +37,7 @@ class Distance(Protocol):
 
 
 def _checked_bounds(bounds: ArrayLike) -> Array:
-    """(2, 3) numbers; InvalidInput for anything that is not a low and a high corner."""
+    """The bounds as a (2, 3) array; InvalidInput if they are not a low and a high corner."""
     corners = real_array(bounds, "bounds")
     if corners.shape != (2, 3) or not np.isfinite(corners).all() or not (corners[0] < corners[1]).all():
         raise InvalidInput(f"bounds: got {bounds!r:.80}; low and high corner, shape (2, 3), are needed")
@@ -57,7 +57,7 @@ def sdf_grid(
     the coordinates of `sdf`, a NeuralSdf, a MeshSdf or any function of points (p, 3) → (p,) with a `frame`.
     `resolution` cells span the longest side of `bounds` ((2, 3): low and high corner; without it the
     frame's cube).
-    InvalidInput for a resolution or bounds that make no grid; Cancelled where `task` is.
+    InvalidInput for an invalid resolution or bounds; Cancelled if `task` is cancelled.
     """
     low, high = RESOLUTION["low"], RESOLUTION["high"]
     if not isinstance(resolution, (int, np.integer)) or not low <= resolution <= high:
@@ -91,8 +91,8 @@ def sdf_grid(
 def save_grid(path: FilePath, values: ArrayLike, origin: ArrayLike, spacing: float) -> None:
     """Writes a grid of sdf_grid as .npz (`values`, `origin`, `spacing`) or .vdb, by the path's extension.
 
-    A .vdb holds one float grid, `surface`: a level set whose values are cut off BAND voxels from the surface.
-    ImportError where no openvdb module is found, InvalidInput for another extension or what is no grid
+    A .vdb contains one float grid, `surface`: a level set with a narrow band of BAND voxels on each side.
+    ImportError without an openvdb module; InvalidInput for another extension, or values that are not a grid
     of finite numbers.
     """
     values, origin, spacing = _checked_grid(values, origin, spacing)
@@ -111,7 +111,7 @@ def save_grid(path: FilePath, values: ArrayLike, origin: ArrayLike, spacing: flo
 
 
 def _checked_grid(values, origin, spacing):
-    """The same as arrays; `values` keep their type."""
+    """The arguments as arrays; `values` keep their type."""
     numbers, corner, step = (
         real_array(given, name)
         for given, name in ((values, "values"), (origin, "origin"), (spacing, "spacing"))
@@ -127,7 +127,7 @@ def _checked_grid(values, origin, spacing):
 
 
 def openvdb_module():
-    """OpenVDB's Python module: Blender's own, also beside an installed `bpy`. ImportError for none."""
+    """OpenVDB's Python module, also Blender's or that of an installed `bpy`; ImportError without one."""
     try:
         return importlib.import_module("openvdb")
     except ImportError:
@@ -154,7 +154,7 @@ def _write_vdb(openvdb, partial, path, values, origin, spacing):
     matrix = np.diag([spacing] * 3 + [1.0])
     matrix[3, :3] = origin  # OpenVDB multiplies row vectors
     grid.transform = openvdb.createLinearTransform(matrix.tolist())
-    # OpenVDB says nothing of a disk that is full: what arrived is read again.
+    # OpenVDB does not report a full disk: the file is read back.
     try:
         openvdb.write(str(partial), grids=[grid])
         arrived = openvdb.read(str(partial), grid.name)

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Point caches: a mesh's vertices, frame by frame, in the two formats that Blender's Mesh Cache plays.
+"""Point caches: a mesh's vertices in each frame, in the two formats of Blender's Mesh Cache modifier.
 
     with PointCacheWriter("walk.pc2", points=len(vertices), frames=250, start=1) as cache:
         for positions in motion:
             cache.write(positions)
 
 **PC2**, little-endian: "POINTCACHE2\\0", version 1 and the number of points (int32), start and sampling rate,
-both in frames (float32), the number of samples (int32); then three float32 a point, a sample after the other.
+both in frames (float32), the number of samples (int32); then for each sample three float32 per point.
 **MDD**, big-endian: the numbers of samples and of points (int32), each sample's time in seconds (float32),
-then three float32 a point as before. Memory holds one frame at a time, however long the cache is.
+then three float32 per point as before. Only one frame is held in memory.
 """
 
 import errno
@@ -33,14 +33,14 @@ Frame: TypeAlias = npt.NDArray[np.float32]
 
 
 class PointCacheWriter:
-    """Writes a cache, one frame after the other; its file takes its place whole, at the end, or not at all.
+    """Writes a cache frame by frame; the file is replaced atomically at the end.
 
-    `start` and `step` are frames, fractions allowed: sample i is that of frame start + i · step. An MDD holds
-    seconds, `fps` frames each. As a context manager it commits when the block ends without an error, and else
-    leaves what was there. Without one: finish(), which brings it to the disk and looks at it, commit(), which
-    also puts it there, and discard() at last, in any case; several objects' caches are finished before the
-    first is committed. InvalidInput for what makes no cache, OSError that names the file where the disk is
-    full (as far as that shows, before the first frame) or the system refuses.
+    Sample i is at frame start + i · step, which may be fractional; an MDD stores seconds, by `fps`. As a
+    context manager it commits if the block ends without an error, else it leaves an existing file. Otherwise
+    call finish(), which syncs and checks the file, then commit(), which renames it, and in any case
+    discard(); finish several caches before the first commit to replace all or none. InvalidInput for invalid
+    arguments; OSError with the file's name if the disk is full (if possible before the first frame) or the
+    system fails.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class PointCacheWriter:
 
     @property
     def frames(self) -> int:
-        """The number of samples that the cache is to have; `written` are there already."""
+        """The number of samples of the complete cache; `written` of them are written."""
         return int(self._layout.frames)
 
     def _require_room(self, free: int) -> None:
@@ -86,7 +86,7 @@ class PointCacheWriter:
             raise OSError(errno.ENOSPC, needs, str(self.path))
 
     def write(self, positions: ArrayLike) -> None:
-        """Adds the next frame's positions (points, 3); InvalidInput names a frame that cannot be kept."""
+        """Writes the next frame's positions (points, 3); InvalidInput names an invalid frame."""
         where = f"{self.path}: sample {self.written}"
         if self.written >= self.frames:
             raise InvalidInput(f"{where}: the cache was made for {self.frames}")
@@ -102,7 +102,7 @@ class PointCacheWriter:
         self.written += 1
 
     def finish(self) -> None:
-        """Brings the file to the disk and compares its size with what the format says."""
+        """Syncs the file and checks its size."""
         if self.written < self.frames:
             raise InvalidInput(f"{self.path}: {self.written} of {self.frames} samples were written")
         with naming(self._output, self.path):
@@ -114,18 +114,18 @@ class PointCacheWriter:
         self._finished = True
 
     def commit(self) -> None:
-        """finish(), if that has not been done, and the file is in its place."""
+        """Calls finish() if necessary, and renames the file to its place."""
         if not self._finished:
             self.finish()
         self._output.commit()
 
     def discard(self) -> None:
-        """Removes what has not been committed."""
+        """Removes the temporary file if it is not committed."""
         try:
             if hasattr(self, "_file"):
                 self._file.close()
         except OSError:
-            pass  # a full disk, which has been told already
+            pass  # a full disk, which was reported before
         finally:
             self._output.discard()
 
@@ -143,11 +143,11 @@ class PointCacheWriter:
 
 
 class PointCacheReader:
-    """Reads a cache's frames, in any order: cache[i] is an array (points, 3), and len(cache) their number.
+    """Reads the frames of a cache in any order: cache[i] is an array (points, 3), len(cache) their number.
 
-    `times` (frames,) are frames in a PC2, seconds in an MDD (`unit` says which). The header's numbers are
-    compared with the file's size before anything is made of them: InvalidInput that names the file for one
-    that is cut off, no point cache, or holds what is not finite.
+    `times` (frames,) are frames in a PC2, seconds in an MDD, as `unit` says. The header is checked against
+    the file's size first: InvalidInput names a file that is truncated, no point cache, or has values that
+    are not finite.
     """
 
     def __init__(self, path: FilePath) -> None:

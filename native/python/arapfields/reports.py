@@ -50,7 +50,7 @@ class HandleError(Report):
 
 @dataclass(frozen=True, kw_only=True)
 class EnergyReport(Report):
-    """What the reports of deform, stylize and LiveDeformer share, measured at surface samples."""
+    """Common fields of the reports of deform, stylize and LiveDeformer, measured at surface samples."""
 
     stretch: float
     """Mean ‖J − R‖²."""
@@ -101,7 +101,7 @@ class SolveReport(EnergyReport):
 
 @dataclass(frozen=True, kw_only=True)
 class LiveReport(EnergyReport):
-    """The last solve or step of a LiveDeformer. `speed`, in mesh units per second, is that of a step."""
+    """The last solve or step of a LiveDeformer. `speed`: that of a step, in mesh units per second."""
 
     value: float
     """The minimised value: all terms."""

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line, `python -m arapfields`: one verb a step of the pipeline. See `--help`."""
+"""The command line, `python -m arapfields`, with a verb for each step of the pipeline. See `--help`."""

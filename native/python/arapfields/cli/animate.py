@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The verb animate: a mesh under handles that move from frame to frame, solved frame by frame."""
+"""The verb animate: deforms a mesh by handles that move from frame to frame."""
 
 import errno
 import sys
@@ -20,7 +20,7 @@ from .running import Outputs, with_progress
 from .splat_frames import animate_splats
 from .tracks import read_tracks
 
-LINES = 15.0  # seconds between lines where there is no terminal
+LINES = 15.0  # seconds between lines of progress without a terminal
 
 
 def animate(args):
@@ -51,7 +51,7 @@ def animate(args):
 
 
 def _run(args, solver, store, tracks, places, mesh):
-    """Solves this run's frames and, where none is missing then, writes the output; says what it did."""
+    """Solves the frames of this run, and writes the output if all frames are solved; returns a message."""
     output, points, wanted = store.output, store.points, list(places)
     (vertices, triangles), (number, shards) = mesh, args.shard or (1, 1)
     mine = [index for index in wanted[number - 1 :: shards] if not store.has(places[index])]
@@ -85,7 +85,7 @@ def _solve(solver, vertices, store, places, mine, task, args):
         place = places[index]
         name = f"frame {int(place.name[:7])}"
         task.report(done / len(mine), name)
-        if not store.has(place):  # another run may have made it meanwhile
+        if not store.has(place):  # another run may have solved it meanwhile
             store.put(place, solver.field(index, task)(vertices))
         if not args.quiet and not sys.stderr.isatty() and time.monotonic() - said > LINES:
             said = time.monotonic()
@@ -93,7 +93,7 @@ def _solve(solver, vertices, store, places, mine, task, args):
 
 
 def _write(output, frames, shape, fps, start, task, args):
-    """The output, from `frames` (an iterable of (n, 3)); shape: their number, that of points, triangles."""
+    """Writes the output; `frames`: iterable of (n, 3); shape: numbers of frames and points, the triangles."""
     count, points, triangles = shape
 
     def told():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading and writing meshes, point clouds, normals, SDFs and fields. Every error names the file."""
+"""Reads and writes meshes, point clouds, normals, SDFs and fields. Errors name the file."""
 
 import codecs
 import contextlib
@@ -19,22 +19,22 @@ MESH_SUFFIXES = (".ply", ".obj", ".stl", ".off")
 CLOUD_SUFFIXES = (".ply", ".npz", ".xyz")
 STATE_SUFFIXES = (".safetensors",)
 OBJ_VERTEX = re.compile(r"^([ \t]*v[ \t]+)(\S+)[ \t]+(\S+)[ \t]+(\S+)", flags=re.M)
-MOST_PREFERRED = 256  # face normals a chosen mesh may have as preferred normals
+MOST_PREFERRED = 256  # largest number of preferred normals from a mesh's faces
 
 
 def _trimesh():
     try:
-        with uninterrupted():  # parts of it swallow Ctrl-C while they are imported
+        with uninterrupted():  # some of its modules catch Ctrl-C during import
             import trimesh
     except ImportError:
         raise ImportError("meshes need the package trimesh: pip install 'arapfields[cli]'") from None
-    logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # what matters is in our own error
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # our errors contain what matters
     return trimesh
 
 
 @contextlib.contextmanager
 def readable(path, kind):
-    """InvalidInput naming the file instead of whatever a reader stumbles over in a damaged one."""
+    """Context manager: errors of readers on damaged files become InvalidInput that names the file."""
     try:
         yield
     except (InvalidInput, MemoryError):
@@ -51,9 +51,9 @@ def is_mesh(path):
 
 
 def read_mesh(path):
-    """Vertices (n, 3) and triangles (m, 3) of a file; larger polygons are cut into triangles.
+    """Vertices (n, 3) and triangles (m, 3) of a file; polygons are triangulated.
 
-    Vertices keep the file's order, except that an STL's equal corners become one vertex.
+    The vertices' order is the file's; equal corners of an STL are merged.
     """
     path = existing_file(path, MESH_SUFFIXES)
     trimesh = _trimesh()
@@ -74,7 +74,7 @@ def read_mesh(path):
             )
     if triangles.size == 0:
         raise InvalidInput(f"{path}: has no faces (or is cut off); a triangle mesh is needed")
-    fits = (np.abs(vertices) <= np.finfo(np.float32).max).all(axis=1)  # what is written is single precision
+    fits = (np.abs(vertices) <= np.finfo(np.float32).max).all(axis=1)  # files have single precision
     if not fits.all():
         first = int(np.flatnonzero(~fits)[0])
         raise InvalidInput(f"{path}: vertex {first} is NaN, infinite or beyond single precision")
@@ -89,7 +89,7 @@ def read_mesh(path):
 
 
 def _stream(path):
-    """The path; of text with a byte order mark, which trimesh takes for a part of a word, the text."""
+    """The path, or a stream of the text without its byte order mark, which trimesh misreads."""
     with path.open("rb") as file:
         is_marked = file.read(3).startswith((codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     is_text = path.suffix.lower() in (".obj", ".off")
@@ -102,16 +102,16 @@ def _merged(vertices, triangles):
 
 
 def write_mesh(path, vertices, triangles):
-    """Writes PLY, OBJ, STL or OFF, by the path's extension."""
+    """Writes PLY, OBJ, STL or OFF by the path's extension."""
     mesh = _trimesh().Trimesh(vertices, triangles, process=False)
     mesh.export(path)
 
 
 def write_moved_mesh(path, source, mesh, move):
-    """The mesh of the file `source`, its vertices moved by `move`, points (n, 3) → (n, 3).
+    """Writes the mesh of the file `source` with its vertices moved by `move`, points (n, 3) → (n, 3).
 
-    OBJ to OBJ keeps everything else of the file: polygons, texture coordinates, materials, groups; normals
-    go, which would be those of the old shape. Otherwise positions and triangles alone are written.
+    From OBJ to OBJ, polygons, texture coordinates, materials and groups are kept; normals are removed, as
+    they are those of the old shape. Otherwise only positions and triangles are written.
     """
     if path.suffix.lower() == Path(source).suffix.lower() == ".obj":
         moved = moved_obj(source, move)
@@ -123,9 +123,9 @@ def write_moved_mesh(path, source, mesh, move):
 
 
 def moved_obj(source, move):
-    """The text of an OBJ file, its vertices moved; None where one is not finite."""
+    """The text of an OBJ file with its vertices moved; None if one is not finite."""
     text = read_text(source, "surrogateescape")
-    text = re.sub(r"\\\r?\n", "", text)  # lines that go on in the next
+    text = re.sub(r"\\\r?\n", "", text)  # continued lines
     with readable(source, "OBJ"):
         before = np.array([[float(c) for c in m.groups()[1:]] for m in OBJ_VERTEX.finditer(text)])
     if not np.isfinite(before).all():
@@ -141,7 +141,7 @@ def _without_normals(line):
 
 
 def write_cloud(path, points, normals):
-    """Points (n, 3) with normals (n, 3) as binary PLY, NPZ (`points`, `normals`), or rows of text."""
+    """Writes points (n, 3) with normals (n, 3) as binary PLY, NPZ (`points`, `normals`), or rows of text."""
     suffix = path.suffix.lower()
     if suffix == ".npz":
         write_arrays(path, points=points, normals=normals)
@@ -156,12 +156,12 @@ def write_cloud(path, points, normals):
 
 
 def read_sdf(path):
-    """A NeuralSdf that `fit` saved."""
+    """A NeuralSdf written by `fit`."""
     return _native.NeuralSdf.load(existing_file(path, STATE_SUFFIXES))
 
 
 def read_field(path):
-    """A DeformationField that `deform` or `stylize` saved."""
+    """A DeformationField written by `deform` or `stylize`."""
     return _native.DeformationField.load(existing_file(path, STATE_SUFFIXES))
 
 
@@ -171,7 +171,7 @@ def read_normals(path):
     if is_mesh(path):
         return _face_normals(path)
     with readable(path, "rows of three numbers"):
-        if path.suffix.lower() == ".npy":  # mapped: its size is compared with the file's
+        if path.suffix.lower() == ".npy":  # memory-mapped, which checks its size against the file's
             normals = np.array(np.lib.format.open_memmap(path, mode="r"), float)
         else:
             normals = np.loadtxt(read_text(path).replace(",", " ").splitlines(), ndmin=2)
@@ -186,7 +186,7 @@ def read_normals(path):
 
 
 def read_style_object(path):
-    """The ObjectStyle of a mesh file; errors name the file."""
+    """The ObjectStyle of a mesh file."""
     vertices, triangles = read_mesh(existing_file(path, MESH_SUFFIXES))
     try:
         return ObjectStyle(vertices, triangles)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flags that several verbs share."""
+"""Flags of several verbs."""
 
 import arapfields as af
 
@@ -120,7 +120,7 @@ def report_flag(parser):
 
 
 def style_flags(parser):
-    """Which style, and how it stands."""
+    """Adds the flags of the style and its orientation."""
     style = parser.add_mutually_exclusive_group(required=True)
     style.add_argument("--style", metavar="NAME", help=f"one of {', '.join(af.style_names())}")
     style.add_argument(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the verb animate solves: the fields of frames."""
+"""Solves the frames of the verb animate."""
 
 import hashlib
 
@@ -10,7 +10,7 @@ import arapfields as af
 from .options import given_options, result_options
 from .touching import contact_key, contact_of
 
-STEPS, TOLERANCE = 300, 1e-6  # of a frame's solve, which starts from rest, where nothing else is said
+STEPS, TOLERANCE = 300, 1e-6  # defaults for frames, which are solved from rest
 
 
 def frames_wanted(args, tracks):
@@ -25,7 +25,7 @@ def frames_wanted(args, tracks):
 
 
 def secondary_motion(args):
-    """The options of --secondary; None where frames are to be solved each for itself."""
+    """The options of --secondary; None without it."""
     options = given_options(af.SecondaryMotionOptions, args)
     given = [name for name in options.fields if getattr(args, f"option_{name}") is not None]
     if given and not args.secondary:
@@ -36,7 +36,7 @@ def secondary_motion(args):
 
 
 def solve_limits(args):
-    """What a solve from rest may take: more than the options' own, which are for a drag."""
+    """Iterations and tolerance of a solve from rest; the options' defaults are for interactive drags."""
     return {
         "iterations": STEPS if args.option_iterations is None else 0,
         "tolerance": TOLERANCE if args.option_tolerance is None else 0.0,
@@ -44,8 +44,8 @@ def solve_limits(args):
 
 
 class FrameSolver:
-    """Fields of frames: each from rest, a function of its own frame alone; or with secondary motion, each
-    from the one before, the tracks' first at rest."""
+    """Fields of frames: each solved from rest, or with secondary motion stepped from the frame before,
+    beginning with the first frame of the tracks at rest."""
 
     def __init__(self, samples, tracks, options, args):
         self._samples, self._tracks, self._options = samples, tracks, options
@@ -53,19 +53,19 @@ class FrameSolver:
         self._contact, self._contact_key = contact_of(args), contact_key(args)
         points = self._samples.points
         self._bounds = np.array([points.min(0), points.max(0)])
-        self._live = self._at = None  # the frame that was stepped to
+        self._live = self._at = None  # the frame of the last step
         self._digests = []
 
     def _handles(self, index):
         return self._tracks.handles(index, self._bounds)
 
     def check(self, indices):
-        """InvalidInput names the first frame whose handles cannot be."""
+        """InvalidInput names the first frame with invalid handles."""
         for index in indices:
             self._handles(index)
 
     def description(self, index):
-        """Bytes that stand for all that the frames have in common; `index` is any frame's."""
+        """Bytes of all inputs that the frames have in common; `index`: any frame."""
         rest = [(type(h).__name__, np.asarray(h.rest).tolist(), h.weight) for h in self._handles(index)]
         further = [] if self._secondary is None else [self._tracks.fps, self._secondary.to_dict()]
         text = repr(
@@ -74,10 +74,10 @@ class FrameSolver:
         return text.encode()
 
     def key(self, index):
-        """Arrays that tell the frame's shape from others."""
+        """Arrays that determine the frame's shape."""
         if self._secondary is None:
             return self._tracks.targets(index)
-        while len(self._digests) <= index:  # of a frame's targets, and of all before
+        while len(self._digests) <= index:  # each of a frame's targets and the digest before
             targets = [
                 np.asarray(target, float).tobytes() for target in self._tracks.targets(len(self._digests))
             ]
@@ -85,7 +85,7 @@ class FrameSolver:
         return [np.frombuffer(self._digests[index], np.uint8)]
 
     def field(self, index, task):
-        """Cancelled where the task is."""
+        """The field of a frame; raises Cancelled if the task is cancelled."""
         if self._live is None:
             settings = {"contact": self._contact, "task": task}
             self._live = af.LiveDeformer(self._samples, self._handles(index), self._options, **settings)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames that have been solved already: a file each, so that a run goes on where another ended."""
+"""Store of solved frames, a file each, so that an interrupted run can be continued."""
 
 import contextlib
 import errno
@@ -18,19 +18,19 @@ TYPE = np.dtype("<f4")
 
 
 def folder_beside(output):
-    """The folder ".NAME.frames" of what is kept of an output's frames."""
+    """The folder ".NAME.frames" for solved frames of an output."""
     return output.with_name(f".{output.name}.frames")
 
 
 class FrameStore:
-    """The folder beside an output. Several processes, also of several machines, may fill it.
+    """The folder of solved frames beside an output. Several processes and machines may write to it.
 
-    A frame's file appears whole, and its name tells what it was made from: a frame whose handles, or whose
-    mesh, options or version have changed is not found.
+    Files are replaced atomically, and their names contain a hash of the inputs: after a change of handles,
+    mesh, options or version a frame is not found.
     """
 
     def __init__(self, output, points, common):
-        """`common`: bytes that stand for all that the frames have in common."""
+        """`common`: bytes of all inputs that the frames have in common."""
         self.output = output = Path(output)
         self.folder = folder_beside(output)
         self.points, self._common = points, hashlib.blake2b(common, digest_size=16).digest()
@@ -52,7 +52,7 @@ class FrameStore:
             return False
 
     def put(self, place, positions):
-        """Keeps (points, 3); what is not finite has no place in a file."""
+        """Stores positions (points, 3); InvalidInput if they are not finite."""
         with np.errstate(over="ignore"):
             kept = np.ascontiguousarray(positions, TYPE)
         if not np.isfinite(kept).all():
@@ -71,7 +71,7 @@ class FrameStore:
         return frame.reshape(-1, 3)
 
     def require_room(self, missing, output_bytes):
-        """OSError where the frames to come and the output will not fit on the disk."""
+        """OSError if the missing frames and the output do not fit on the disk."""
         needed = missing * self.frame_bytes + output_bytes
         free = shutil.disk_usage(self.folder.parent).free
         if free < needed:
@@ -80,16 +80,16 @@ class FrameStore:
 
     @contextlib.contextmanager
     def only_run(self, part, places):
-        """Whether no other process is at work on this part of the frames; else it makes what this one would.
+        """Context manager: False if another process solves the same part of the frames.
 
-        InvalidInput where the other solves something else. Where the file system has no locks all may work.
+        InvalidInput if that process solves other frames or options. True without locks of the file system.
         """
         first = False
         try:
             with self._one_run(part, places) as first:
                 yield first
         finally:
-            if first and os.name == "nt" and self.folder.exists():  # Windows removes no open file
+            if first and os.name == "nt" and self.folder.exists():  # Windows cannot remove an open file
                 self.remove(())
 
     @contextlib.contextmanager
@@ -121,7 +121,7 @@ class FrameStore:
 
     @contextlib.contextmanager
     def alone(self):
-        """No other process is in such a block, where the file system has locks."""
+        """Context manager that one process at a time enters, if the file system supports locks."""
         self.folder.mkdir(exist_ok=True)
         with open(self.folder / "lock", "ab") as file:
             with contextlib.suppress(OSError):
@@ -129,7 +129,7 @@ class FrameStore:
             yield
 
     def remove(self, places=None):
-        """Forgets these frames; without them all, also those of other settings."""
+        """Removes these frames; with None all, also those of other settings."""
         for place in places or ():
             place.unlink(missing_ok=True)
         if places is None or not any(not path.name.startswith("lock") for path in self.folder.iterdir()):

@@ -19,7 +19,7 @@ KEYS = {
 
 
 def read_handles(path):
-    """The handles' descriptions in a JSON file: a list, or an object whose `handles` is one."""
+    """The descriptions of handles in a JSON file: a list, or an object with a list `handles`."""
     path = existing_file(path)
     try:
         content = json.loads(read_text(path))
@@ -35,7 +35,7 @@ def read_handles(path):
 
 
 def build_handles(described, bounds):
-    """Handles of descriptions (name, dict); infinite box corners are cut to `bounds` (2, 3), widened."""
+    """Handles of descriptions (name, dict); infinite corners of boxes are cut to widened `bounds` (2, 3)."""
     handles = []
     for name, item in described:
         kind = item.get("type")
@@ -90,7 +90,7 @@ def _box(item):
 
 
 def _corners(corners, bounds):
-    """Centre and half-extents of a box by its low and high corner; null and infinite sides are open."""
+    """Center and half extents of a box by its low and high corner; null and infinite sides are open."""
     low, high = (
         [sign * np.inf if side is None else side for side in corner]
         for sign, corner in zip((-1, 1), corners, strict=True)
@@ -107,8 +107,8 @@ def _corners(corners, bounds):
 
 
 def _motion(move, rest):
-    """(4, 4): scales along the box's edges and a turn, both about the pivot (its centre where none is named),
-    then a shift."""
+    """(4, 4) motion: scaling along the box's edges and rotation about the pivot, by default the box's center,
+    then translation."""
     known = ("scale", "rotate", "pivot", "translate")
     unknown = set(move) - set(known)
     if unknown:
@@ -126,7 +126,7 @@ def _motion(move, rest):
 
 
 def rotation(value):
-    """(3, 3) from None, a matrix, or {"axis": [x, y, z], "degrees": d}."""
+    """(3, 3) rotation from None, a matrix, or {"axis": [x, y, z], "degrees": d}."""
     if value is None:
         return np.eye(3)
     if not isinstance(value, dict):
@@ -140,7 +140,7 @@ def rotation(value):
 
 
 def turn_upright(up):
-    """(3, 3) the smallest rotation that takes z to the direction (3,)."""
+    """(3, 3) smallest rotation from z to the direction (3,)."""
     length = np.linalg.norm(up)
     if not 0 < length < np.inf:
         raise ValueError("a direction is zero or not finite")
@@ -158,7 +158,7 @@ def _numbers(value, shape):
 
 
 def triple(text):
-    """x,y,z of a flag."""
+    """Argument type "x,y,z"."""
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
@@ -167,7 +167,7 @@ def triple(text):
 
 
 class AddHandle(argparse.Action):
-    """--box LOW HIGH and --point FROM TO append a handle's description."""
+    """Action of --box LOW HIGH and --point FROM TO: appends a handle's description."""
 
     def __call__(self, parser, namespace, values, option_string=None):
         if option_string == "--point":
@@ -182,8 +182,7 @@ class AddHandle(argparse.Action):
 
 
 class MoveHandle(argparse.Action):
-    """--turn AXIS DEGREES, --scale FACTORS, --pivot POINT and --shift VECTOR move the box named last; --reach
-    LENGTH is of a point too."""
+    """Action of --turn, --scale, --pivot and --shift, for the last box, and of --reach, also for points."""
 
     def __call__(self, parser, namespace, values, option_string=None):
         if option_string == "--reach":

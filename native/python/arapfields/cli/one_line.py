@@ -4,7 +4,7 @@ import sys
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Errors are one line, with exit code 2; what a verb does not know points to the verb's own help."""
+    """An ArgumentParser that prints errors in one line, with exit code 2, and names the verb's help."""
 
     def error(self, message):
         print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)

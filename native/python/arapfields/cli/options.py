@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Options of the library as flags: one for each, its sentence as help, its default kept."""
+"""Flags of the library's options, with their sentences as help."""
 
 import argparse
 import re
@@ -11,7 +11,7 @@ NUMBERS = {"int": int, "seed": int, "float": float}
 
 
 def add_option_flags(parser, operation, title):
-    """A group with a flag for each option of the operation, `learning_rate` → `--learning-rate`."""
+    """Adds a group with a flag for each option of the operation, `learning_rate` → `--learning-rate`."""
     group = parser.add_argument_group(title)
     presets = presets_of(operation)
     if presets:
@@ -26,7 +26,7 @@ def add_option_flags(parser, operation, title):
 
 
 def add_option_flag(parser, operation, name):
-    """The flag of one option, which stands for itself: its value is the default where it is not given."""
+    """Adds the flag of a single option, with the option's default."""
     option = options_of(operation)[name]
     add_flag(parser, option, dest=name, default=option["default"])
 
@@ -47,12 +47,12 @@ def add_flag(group, option, **settings):
 
 
 def result_options(options):
-    """The options as a dict, but for those that change no result."""
+    """{name: value} of the options that affect results."""
     return {name: value for name, value in options.to_dict().items() if name != "threads"}
 
 
 def integer(low, high=2**31 - 1):
-    """A flag's type: an integer from `low` to `high`."""
+    """Argument type: an integer from `low` to `high`."""
 
     def number(text):
         try:
@@ -67,7 +67,7 @@ def integer(low, high=2**31 - 1):
 
 
 def shard(text):
-    """A flag's type: "i/n", the i-th of n parts, 1 ≤ i ≤ n."""
+    """Argument type "i/n": the i-th of n parts, 1 ≤ i ≤ n."""
     found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text.strip())
     if not found or not 1 <= int(found[1]) <= int(found[2]):
         raise argparse.ArgumentTypeError(f"{text[:40]!r} is not I/N, the part I of N, such as 1/4")
@@ -75,7 +75,7 @@ def shard(text):
 
 
 def given_options(structure, arguments):
-    """The struct with the values that were given."""
+    """The options struct with the given flags."""
     chosen = getattr(arguments, "preset", None)
     options = structure.preset(chosen) if chosen else structure()
     for name in structure.fields:
@@ -89,7 +89,7 @@ def given_options(structure, arguments):
 
 
 def given(arguments, operation, name):
-    """One option of an operation: what was given, else its default."""
+    """The value of an option: the given flag, else the default."""
     value = getattr(arguments, f"option_{name}")
     return options_of(operation)[name]["default"] if value is None else value
 

@@ -25,7 +25,7 @@ from .touching import contact_flags
 
 
 class CMakeDir(argparse.Action):
-    """Prints arapfields_DIR."""
+    """Action that prints arapfields_DIR."""
 
     def __call__(self, parser, namespace, values, option_string=None):
         print(af.cmake_dir())
@@ -34,7 +34,7 @@ class CMakeDir(argparse.Action):
 
 def parse(arguments):
     """The parsed arguments; `run` is the verb's function."""
-    # A token such as -inf,0,1 is a value: a blank in front tells argparse so.
+    # argparse takes a token such as -inf,0,1 for a value only with a space in front.
     return _parser().parse_args([" " + a if re.match(r"-(\d|\.\d|inf)", a) else a for a in arguments])
 
 
@@ -135,7 +135,7 @@ def _stylize(added):
 
 
 def _by_module(module, added):
-    """The verb of a module of its own."""
+    """The function of a verb, from a module that is imported when it runs."""
     parser = _verb(added, module.NAME, module.run, module.SUMMARY, *module.EXAMPLES)
     module.add_flags(parser)
     return parser

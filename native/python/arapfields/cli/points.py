@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points that a field moves: point sets, curves, and numbers for the vertices of a mesh."""
+"""Point sets and curves to be moved by a field, and weights of a mesh's vertices."""
 
 import re
 
@@ -15,9 +15,9 @@ WARPED = (*MESH_SUFFIXES, *TEXT_SUFFIXES, *ARRAY_SUFFIXES)
 
 
 def warped(source):
-    """A function write(path, move) that writes the points of `source`, moved, to a path.
+    """A function write(path, move) that writes the moved points of `source` to a path.
 
-    Meshes and OBJ curves keep the rest of their file. Of point sets, rows x y z are read and written.
+    For meshes and OBJ curves the rest of the file is kept; point sets are rows x y z.
     """
     source = existing_file(source, WARPED)
     suffix = source.suffix.lower()
@@ -51,7 +51,7 @@ def _has_faces(path):
 
 
 def _write_obj(path, source, move):
-    """Lines, curves and points of an OBJ file, which has no faces."""
+    """Writes the moved lines, curves and points of an OBJ file without faces."""
     text = read_text(source, "surrogateescape")
     if not OBJ_VERTEX.search(text):
         raise InvalidInput(f"{source}: has no vertices; points, curves or a mesh are needed")
@@ -72,7 +72,7 @@ def _ply_cloud(path):
 
 
 def _rows(path):
-    """Points (n, 3) of rows of text, of which normals may follow, or of an array."""
+    """Points (n, 3) of an array, or of rows of text, in which normals may follow."""
     suffix = path.suffix.lower()
     with readable(path, "points"):
         if suffix == ".npz":
@@ -107,14 +107,14 @@ def _write_points(path, points):
 
 
 def read_numbers(path):
-    """Rows of numbers of a .npy array, or of text with blanks or commas between."""
+    """Rows of numbers from a .npy array, or from text separated by spaces or commas."""
     if path.suffix.lower() == ".npy":
         return np.array(np.lib.format.open_memmap(path, mode="r"), float)
     return np.loadtxt(read_text(path).replace(",", " ").splitlines(), ndmin=2)
 
 
 def read_weights(path, vertices):
-    """Numbers (n,) ≥ 0, one for each of so many vertices: rows of a text file, or a .npy array."""
+    """(vertices,) weights ≥ 0 from the rows of a text file, or a .npy array."""
     path = existing_file(path, (*TEXT_SUFFIXES[1:], ".npy"))
     with readable(path, "numbers"):
         if path.suffix.lower() == ".npy":

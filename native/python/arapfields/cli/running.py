@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long calls with a progress bar, and outputs that appear whole or not at all."""
+"""Long calls with a progress bar, and outputs that are replaced atomically."""
 
 import os
 import sys
@@ -9,11 +9,11 @@ from pathlib import Path
 from .._files import naming
 from .._native import InvalidInput, OutputFile, Task
 
-POLL = 0.1  # seconds between looks at a task
+POLL = 0.1  # seconds between reads of a task's progress
 
 
 def place(path):
-    """Where a path leads, behind links where the file system follows them: Wine's fails for long ones."""
+    """The path with links resolved, or the absolute path: Wine cannot resolve long ones."""
     try:
         return os.path.realpath(path)
     except OSError:
@@ -21,13 +21,13 @@ def place(path):
 
 
 def with_progress(label, call, quiet=False):
-    """The result of `call(task)`, made on a thread of its own so that Ctrl-C cancels it.
+    """Returns the result of `call(task)`, run on a thread so that Ctrl-C cancels it.
 
-    A bar is drawn on stderr where that is a terminal and `quiet` is not set.
+    Draws a progress bar if stderr is a terminal and `quiet` is not set.
     """
     task = Task()
     outcome = {}
-    finished = threading.Event()  # a join that Ctrl-C interrupts would take the thread for ended
+    finished = threading.Event()  # a join() interrupted by Ctrl-C would mark the thread as ended
 
     def work():
         try:
@@ -76,14 +76,14 @@ def _show(bar, progress, message):
 
 
 class Outputs:
-    """Files that a verb promises: places are checked first, contents put there together at the end."""
+    """The output files of a verb: paths are checked first, files written later and renamed together."""
 
     def __init__(self):
-        self._promised = {}  # where it will lie: the flag that asked for it
+        self._promised = {}  # {resolved path: its flag}
         self._pending = []
 
     def check(self, path, suffixes, flag):
-        """The path of an output to be; InvalidInput where it cannot become a file of these kinds."""
+        """Returns the path; InvalidInput if no file with one of these suffixes can be written to it."""
         path = Path(path)
         if path.suffix.lower() not in suffixes:
             raise InvalidInput(f"{flag}: {path} has an unknown extension; allowed are {', '.join(suffixes)}")
@@ -95,19 +95,19 @@ class Outputs:
             raise InvalidInput(
                 f"{flag}: {path} cannot be made; the directory {path.parent} cannot be written to"
             )
-        OutputFile(path).discard()  # regular files alone
+        OutputFile(path).discard()  # InvalidInput if it is not a regular file
         other = self._promised.setdefault(place(path), flag)
         if other != flag:
             raise InvalidInput(f"{flag}: {path} is {other}'s file too; each output needs one of its own")
         return path
 
     def write(self, path, writer):
-        """Calls `writer(temporary path)`; the file takes its place when the block ends without an error."""
+        """Calls `writer(temporary path)`; the file is renamed if the block ends without an error."""
         output = OutputFile(path)
         self._pending.append(output)
         with naming(output, path):
             writer(Path(output.partial))
-        output.finish()  # whatever does not arrive shows before any file takes its place
+        output.finish()  # reports errors before any file is renamed
 
     def __enter__(self):
         return self

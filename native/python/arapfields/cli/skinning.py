@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The verb skin: weights of a mesh for bones from a file, and correctives."""
+"""The verb skin: bone weights and correctives of a mesh, for bones from a file."""
 
 import json
 
@@ -75,7 +75,7 @@ def run(args):
 
 
 def read_bones(path):
-    """The bones of a .json file, whose parents are names."""
+    """The bones of a .json file, with parents by name."""
     path = existing_file(path, (".json",))
     with files.readable(path, "bones"):
         rows = json.loads(read_text(path))

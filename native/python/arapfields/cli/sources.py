@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A verb's input, and what can be made of each kind."""
+"""Inputs of verbs by kind."""
 
 import arapfields as af
 
@@ -11,7 +11,7 @@ SOURCES = (*files.MESH_SUFFIXES, *files.STATE_SUFFIXES)
 
 
 class Source:
-    """A mesh, splats or a saved signed distance."""
+    """An input: a mesh, splats or a saved signed distance."""
 
     def __init__(self, args):
         self._args = args
@@ -32,7 +32,7 @@ class Source:
         return af.MeshSdf(*self.mesh) if self.mesh else self._sdf
 
     def write_moved(self, path, field):
-        """The mesh, or the splats, moved."""
+        """Writes the mesh or splats moved by a field."""
         if self.splats:
             field.apply_to(self.splats).save(path)
         else:
@@ -64,13 +64,13 @@ def samples(source, count, seed, args):
 
 
 def read_distance(path):
-    """A mesh's exact distance, or a signed distance that fit saved."""
+    """The exact distance of a mesh, or a signed distance written by `fit`."""
     path = existing_file(path, SOURCES)
     return af.MeshSdf(*files.read_mesh(path)) if files.is_mesh(path) else files.read_sdf(path)
 
 
 def content(path):
-    """The bytes of one of many inputs; InvalidInput where the system does not give them."""
+    """The bytes of a file; InvalidInput if it cannot be read."""
     try:
         return path.read_bytes()
     except OSError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The verb animate for Gaussian splats: a PLY file a frame."""
+"""The verb animate for Gaussian splats: a PLY file per frame."""
 
 import errno
 import os

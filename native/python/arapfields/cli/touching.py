@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flags of what a surface does not pass, and the Contact that they ask for."""
+"""Flags of contact, and the Contact made of them."""
 
 import contextlib
 import hashlib
@@ -32,7 +32,7 @@ def contact_flags(parser):
 
 
 def contact_of(args):
-    """The Contact of the flags; None without any."""
+    """The Contact by the flags; None without any."""
     obstacles = [_obstacle(text) for text in args.obstacle]
     ground, up = None, None
     if args.ground:
@@ -47,13 +47,13 @@ def contact_of(args):
 
 
 def contact_key(args):
-    """What stands for the Contact in names of solved frames."""
+    """Values that determine the Contact, for names of solved frames."""
     read = [(text, hashlib.blake2b(Path(_parts(text)[0]).read_bytes()).hexdigest()) for text in args.obstacle]
     return [read, args.ground, args.itself] if read or args.ground or args.itself else []
 
 
 def _parts(text):
-    """(path, margin); a file's own name may have a colon."""
+    """(path, margin) of "path:margin"; paths may contain colons."""
     head, colon, tail = text.rpartition(":")
     if colon and not Path(text).exists():
         with contextlib.suppress(ValueError):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handle tracks: where each handle is, frame by frame; docs/animate.md describes the two formats."""
+"""Handle tracks: the targets of handles in each frame; docs/animate.md describes the two formats."""
 
 import io
 import json
@@ -20,11 +20,11 @@ MOST_FPS = 1e6
 
 
 class Tracks:
-    """`count` frames, numbered from `start`, `fps` a second; handles(i, bounds) are those of the i-th."""
+    """Handles of `count` frames from number `start`, `fps` per second."""
 
     def __init__(self, path, fps, start, described):
         self.path, self.fps, self.start = path, fps, start
-        self._described = described  # (name, description at rest, (n, 4, 4) or (n, 3)) of each handle
+        self._described = described  # [(name, description at rest, (n, 4, 4) or (n, 3) targets)]
         counts = {len(moves) for _, _, moves in described}
         if not described or counts == {0}:
             raise InvalidInput(f"{path}: has no {'frame' if described else 'handle'}; one or more are needed")
@@ -34,7 +34,7 @@ class Tracks:
         (self.count,) = counts
 
     def handles(self, index, bounds):
-        """The handles of the frame: at rest, and where they are then; InvalidInput names what cannot be."""
+        """The handles of a frame with rest and target; InvalidInput names an invalid handle."""
         where = f"{self.path}: frame {self.start + index}, handle"
         items = [
             (f"{where} {name}", {**rest, "target": moves[index].tolist()})
@@ -43,7 +43,7 @@ class Tracks:
         return build_handles(items, bounds)
 
     def targets(self, index):
-        """What of the frame is not in the others."""
+        """The targets of a frame."""
         return [moves[index] for _, _, moves in self._described]
 
 
@@ -120,7 +120,7 @@ def _column(path, arrays, name, default):
 
 
 def _moves(where, kind, frames):
-    """(n, 4, 4), or (n, 3) for a point, whose matrices count by where they bring the origin."""
+    """(n, 4, 4) targets, or (n, 3) of a point: only the translation of its matrices counts."""
     if frames is None:
         raise InvalidInput(f"{where}: 'frames' is missing")
     try:
@@ -140,7 +140,7 @@ def _moves(where, kind, frames):
 
 
 def read_arrays(path, names):
-    """The named arrays of a NumPy archive; sizes are compared with the file's before anything is made."""
+    """The named arrays of a NumPy archive; their sizes are checked against the file's first."""
     require_memory(str(path), 2.0 * path.stat().st_size)
     content = io.BytesIO(path.read_bytes())
     arrays = {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The verb transfer: what a mesh has, carried over to the mesh that it was wrapped onto, or back."""
+"""The verb transfer: data of a mesh, transferred to the mesh that it was wrapped onto, or back."""
 
 from pathlib import Path
 
@@ -72,7 +72,7 @@ def run(args):
 
 
 def require_pairs(args):
-    """InvalidInput where a flag lacks its other, or there is no output."""
+    """InvalidInput if only one of two paired flags is given, or no output."""
     for given, other, flags in (
         (args.keys, args.into, "--keys and --into"),
         (args.values, args.values_output, "--values and --values-output"),
@@ -84,12 +84,12 @@ def require_pairs(args):
 
 
 def receiver(args):
-    """The file of the mesh that something is carried over to."""
+    """The file of the mesh that receives the data."""
     return args.source if args.back else args.target
 
 
 def output_places(args, outputs):
-    """Where each key goes, by its file, and where arrays go, by flags."""
+    """({file of a key: its output}, {flag: output} of arrays)."""
     suffix = Path(receiver(args)).suffix.lower()
     keys = {}
     for key in args.keys:
@@ -104,7 +104,7 @@ def output_places(args, outputs):
 
 
 def write_key(outputs, place, path, mesh, offsets):
-    """The mesh of a file with its vertices moved."""
+    """Writes the mesh of a file with its vertices moved."""
 
     def moved(rest):
         if len(rest) != len(mesh[0]):
@@ -115,7 +115,7 @@ def write_key(outputs, place, path, mesh, offsets):
 
 
 def write_named(outputs, place, arrays):
-    """Arrays by their names, as the suffix says."""
+    """Writes named arrays as JSON or a NumPy archive, by the suffix."""
     if place.suffix.lower() == ".json":
         text = json_text(arrays) + "\n"
         outputs.write(place, lambda output: output.write_text(text, encoding="utf-8"))
@@ -124,7 +124,7 @@ def write_named(outputs, place, arrays):
 
 
 def shape_of(path, giving):
-    """Vertices (n, 3) of the giving mesh in another shape."""
+    """(n, 3) vertices of the mesh `giving` in another shape, from a file."""
     vertices = files.read_mesh(path)[0]
     if len(vertices) != len(giving[0]):
         raise af.InvalidInput(f"{path}: {len(vertices)} vertices; the mesh has {len(giving[0])}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A moving mesh as USD, by the package usd-core."""
+"""Writes an animated mesh as USD, by the package usd-core."""
 
 import errno
 from pathlib import Path
@@ -11,7 +11,7 @@ from .._native import InvalidInput
 
 SUFFIXES = (".usd", ".usda", ".usdc")
 AXES = ("y", "z")
-AT_ONCE = 64_000_000  # bytes of positions kept before they go to the disk
+AT_ONCE = 64_000_000  # bytes of positions held in memory before they are saved
 
 
 def require_usd():
@@ -26,8 +26,8 @@ def require_usd():
 def write_usd(path, triangles, frames, *, fps, start, up, name="mesh"):
     """Writes a mesh with a time sample for each of `frames`, an iterable of (n, 3), from time code `start`.
 
-    `up` ("y" or "z") is the stage's; positions are written as they are. A text file, .usda, is held in memory
-    whole; .usd and .usdc go to the disk meanwhile. OSError where not all of it arrived.
+    `up` ("y" or "z") is the stage's up axis; positions are not converted. A .usda is held in memory as a
+    whole, .usd and .usdc are saved in between. OSError if the file is incomplete.
     """
     usd = require_usd()
     from pxr import Sdf, Tf, UsdGeom, Vt
@@ -67,7 +67,7 @@ def write_usd(path, triangles, frames, *, fps, start, up, name="mesh"):
 
 
 def _look(usd, geometry, path, start, count, last):
-    """OSError where the file has not all of it."""
+    """OSError if the file is incomplete."""
     stage = usd.Stage.Open(str(path))
     found = geometry.Mesh(stage.GetDefaultPrim()).GetPointsAttr()
     times = found.GetTimeSamples()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each verb does: read, check the outputs' places, compute, write."""
+"""The functions of the verbs: read, check the outputs' paths, compute, write."""
 
 import argparse
 import sys
@@ -137,7 +137,7 @@ def grid(args):
 
 
 def _extracted(sdf, args, field=None):
-    """The surface at rest, or deformed by a field in the way --through says."""
+    """The surface at rest, or deformed by a field, by the method of --through."""
     through = field is not None and args.through == "inverse"
     settings = {"resolution": args.resolution, "refine_thin": args.refine_thin}
 
@@ -153,7 +153,7 @@ def _extracted(sdf, args, field=None):
 
 
 def _solve(args, solve, seed, needs_handles):
-    """What deform and stylize share."""
+    """Common part of deform and stylize."""
     with Outputs() as outputs:
         places = {
             flag: outputs.check(path, suffixes, flag)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""wrap with a folder as its target: one template onto every mesh in it; what is done already is skipped."""
+"""wrap with a folder as its target: one template onto each mesh; existing results are skipped."""
 
 import json
 from pathlib import Path
@@ -12,11 +12,11 @@ from .options import given
 from .running import Outputs, with_progress
 from .wrap_frames import made_of
 
-ONE_TARGET = ("landmark", "landmarks", "save_field", "suggest")  # flags of which each target has its own
+ONE_TARGET = ("landmark", "landmarks", "save_field", "suggest")  # flags for a single target
 
 
 def run(args, options):
-    """Wraps each file; InvalidInput at the end where some failed."""
+    """Wraps onto each mesh; InvalidInput at the end if some failed."""
     output, template = output_folder(args), existing_file(args.input, files.MESH_SUFFIXES)
     everything = meshes_in(args.target)
     output.mkdir(parents=True, exist_ok=True)
@@ -45,7 +45,7 @@ def run(args, options):
 
 
 def output_folder(args):
-    """Where the wrapped meshes go; InvalidInput for flags that a folder cannot have."""
+    """The folder of the wrapped meshes; InvalidInput for flags of single targets."""
     for name in ONE_TARGET:
         if getattr(args, name):
             raise af.InvalidInput(f"--{name.replace('_', '-')}: {args.target} is a folder; wrap one by one")
@@ -57,7 +57,7 @@ def output_folder(args):
 
 
 def meshes_in(folder):
-    """The files of a folder that are meshes, each with a name of its own."""
+    """The mesh files of a folder; InvalidInput if two have the same stem."""
     everything = sorted(p for p in Path(folder).iterdir() if p.suffix.lower() in sources.SOURCES)
     if not everything:
         raise af.InvalidInput(f"{folder}: holds no mesh")
@@ -68,13 +68,13 @@ def meshes_in(folder):
 
 
 def refuse(failed, count):
-    """InvalidInput with the reasons, where some of so many failed."""
+    """InvalidInput with the reasons if some of `count` failed."""
     if failed:
         raise af.InvalidInput(f"{len(failed)} of {count} failed: {'; '.join(failed)}")
 
 
 def write_sheet(output, everything, suffix):
-    """sheet.html: pictures of all that is done by now, here and by other parts, the worst first."""
+    """Writes sheet.html with all finished wraps, also of other shards, the worst first."""
     rows = []
     for path in everything:
         place = output / f"{path.stem}{suffix}"
@@ -85,7 +85,7 @@ def write_sheet(output, everything, suffix):
             wrapped = files.read_mesh(place)
             rows.append((off(report), contact_sheet.cell(path.name, figures.rstrip("; "), wrapped, target)))
         except (OSError, ValueError, KeyError, TypeError):
-            continue  # not there yet, or not of this program
+            continue  # not finished, or of another program
     rows.sort(key=lambda row: -row[0])
     page, place = contact_sheet.page([row for _, row in rows]), output / "sheet.html"
     if place.is_file() and place.read_bytes() == page.encode():
@@ -100,7 +100,7 @@ def off(report):
 
 
 def read_done(place, mark):
-    """The report of an output that the same input and settings made; None where there is none."""
+    """The report of an output if it was made with the same input and settings; else None."""
     try:
         found = json.loads(place.with_suffix(".json").read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wraps of a scanned motion's frames: those that another run has made already are not made again."""
+"""Wraps onto the frames of a scanned motion, stored so that an interrupted run can be continued."""
 
 import hashlib
 import zipfile
@@ -14,7 +14,7 @@ from .options import result_options
 
 
 def made_of(samples, options, *further):
-    """A hash of what wraps of one surface have in common; `further` are bytes."""
+    """A hash object of version, options, samples and `further` bytes."""
     made = hashlib.blake2b(repr((af.__version__, result_options(options))).encode())
     for rows in (samples.points, samples.normals, samples.weights, samples.bend_weights):
         made.update(np.ascontiguousarray(rows).tobytes())
@@ -24,29 +24,29 @@ def made_of(samples, options, *further):
 
 
 class WrappedFrames:
-    """Wraps one frame after the other, each from the last good one, and keeps them in a folder.
+    """Wraps onto frames in order, each from the last good one, and stores the results in a folder.
 
-    A frame's file has the sequence's state behind it, and its report. Its name tells its content, all good
-    frames before it and how these were made. Beside the first frame's lies its field.
+    A frame's file contains the state of the sequence after it, and its report; the file's name a hash of the
+    frame, the settings and all good frames before. The field of the first frame is in a second file.
     """
 
     def __init__(self, folder, samples, options):
         self.folder, self.samples, self.options = folder, samples, options
         self._made = made_of(samples, options).digest()
         self._first, self._sequence, self._places = None, None, []
-        self.found = 0  # frames that were there already
+        self.found = 0  # number of frames read from the folder
 
     @property
     def good(self):
-        """How many frames there are by now, but for bad ones."""
+        """The number of good frames up to now."""
         return len(self._places)
 
     def follow(self, content, read, pairs, run):
         """(field, report) of the next frame.
 
-        `content`: bytes of the frame; `read()` gives its ImplicitFunction; `pairs` of landmarks are for the
-        first one; `run(call)` gives the result of `call(task)`. What is wrong with a frame is raised, and the
-        next one follows the one before.
+        `content`: bytes of the frame; `read()` returns its ImplicitFunction; `pairs`: landmarks of the first
+        frame; `run(call)` returns `call(task)`. Errors of a frame are raised; the next frame then starts from
+        the last good one.
         """
         marks = repr(np.array(pairs).tolist()).encode() if self._first is None else b""
         made = hashlib.blake2b(self._made + marks + content, digest_size=16).digest()
@@ -85,7 +85,7 @@ class WrappedFrames:
             write_arrays(partial, state=state, report=np.array(to_json(report)))
 
     def _kept(self, place):
-        """(field, report) of a file; None where it is not there, or damaged."""
+        """(field, report) from a file; None if it is missing or damaged."""
         try:
             with np.load(place, allow_pickle=False) as kept:
                 state, report = kept["state"], from_json(str(kept["report"]))
@@ -97,7 +97,7 @@ class WrappedFrames:
         return self._sequence.field, report
 
     def forget_others(self):
-        """Removes what is kept of other frames and other settings."""
+        """Removes stored files of other frames and settings."""
         kept = {*self._places, *map(field_of, self._places[:1])}
         for path in self.folder.glob("[0-9]*"):
             if path not in kept:
@@ -105,16 +105,16 @@ class WrappedFrames:
 
 
 class HeldFrames:
-    """Frames of which some are bad: these have the shape before them, or the first one.
+    """Replaces bad frames by the shape before, at the start by the first good one.
 
-    `write(shape)` takes each frame's in turn.
+    `write(shape)` is called for each frame in order.
     """
 
     def __init__(self, write):
         self._write, self._last, self._waiting = write, None, 0
 
     def add(self, shape=None):
-        """The next frame's shape; None for a bad one."""
+        """Adds the next frame's shape; None for a bad frame."""
         self._last = self._last if shape is None else shape
         self._waiting += 1
         while self._last is not None and self._waiting:
@@ -123,5 +123,5 @@ class HeldFrames:
 
 
 def field_of(place):
-    """Where the field of the first frame lies."""
+    """The file of the first frame's field."""
     return place.with_name(f"{place.name}.safetensors")

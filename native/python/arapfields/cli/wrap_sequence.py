@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""wrap with --sequence: one template onto each frame of a scanned motion, into a point cache."""
+"""wrap with --sequence: a template onto each frame of a scanned motion, as a point cache."""
 
 import re
 from pathlib import Path
@@ -18,7 +18,7 @@ NOT_OF_FRAMES = ("shard", "save_field", "suggest", "report")
 
 
 def frames_of(folder):
-    """The meshes of a folder, by the numbers in their names: 2 before 10."""
+    """The meshes of a folder, sorted by the numbers in their names."""
     paths = [path for path in Path(folder).iterdir() if path.suffix.lower() in sources.SOURCES]
     if not paths:
         raise af.InvalidInput(f"{folder}: holds no mesh")
@@ -26,12 +26,12 @@ def frames_of(folder):
 
 
 def by_numbers(name):
-    """What names are ordered by: scan 2 comes before scan 10."""
+    """Sort key of names by their numbers: scan 2 before scan 10."""
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 
 def run(args, options, pairs):
-    """Wraps each frame from the last good one; `pairs` of landmarks are those of the first.
+    """Wraps onto each frame from the last good one; `pairs`: landmarks of the first.
 
     InvalidInput at the end names all bad frames.
     """
@@ -59,7 +59,7 @@ def run(args, options, pairs):
 
 
 def write(output, frames, paths, pairs, vertices, quiet):
-    """The cache, where any frame is good; returns what is wrong with the bad ones."""
+    """Writes the cache if any frame is good; returns the errors of bad frames."""
     worst, failed = (-1.0, ""), []
     with PointCacheWriter(output, points=len(vertices), frames=len(paths), start=1) as cache:
         held = HeldFrames(cache.write)

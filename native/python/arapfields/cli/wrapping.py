@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The verb wrap: a mesh onto a target, with pairs of landmarks from flags or a file."""
+"""The verb wrap: wraps a mesh onto a target, with pairs of landmarks from flags or a file."""
 
 import json
 from pathlib import Path
@@ -81,7 +81,7 @@ def run(args):
 
 
 def run_one(args, options):
-    """One mesh onto one target."""
+    """Wraps one mesh onto one target."""
     with Outputs() as outputs:
         places, report = output_places(args, outputs)
         pairs = given_pairs(args)
@@ -112,7 +112,7 @@ def run_one(args, options):
 
 
 def output_places(args, outputs):
-    """Where each output goes, by its flag, and the report; InvalidInput where there is none."""
+    """{flag: path} of the outputs, and the report's path; InvalidInput without an output."""
     wanted = {
         "--output": (args.output, files.MESH_SUFFIXES),
         "--save-field": (args.save_field, files.STATE_SUFFIXES),
@@ -130,17 +130,17 @@ def output_places(args, outputs):
 
 
 def wraps(places):
-    """Whether one of the outputs needs the wrap itself."""
+    """Whether an output needs the wrap, not only suggested landmarks."""
     return bool(places.keys() - {"--suggest"})
 
 
 def given_pairs(args):
-    """Pairs of landmarks, from the file and the flags."""
+    """Pairs of landmarks from the file and the flags."""
     return (read_landmarks(args.landmarks) if args.landmarks else []) + (args.landmark or [])
 
 
 def read_landmarks(path):
-    """Pairs of places (3,): rows of six numbers, or JSON [[[x, y, z], [x, y, z]], …]."""
+    """Pairs of points (3,) from rows of six numbers, or JSON [[[x, y, z], [x, y, z]], …]."""
     path = existing_file(path, LANDMARKS)
     with files.readable(path, "pairs of places"):
         if path.suffix.lower() == ".json":
@@ -157,7 +157,7 @@ def read_landmarks(path):
 
 
 def write_landmarks(path, suffix, pairs):
-    """As read_landmarks reads them; the kind follows from the suffix."""
+    """Writes pairs in a format of read_landmarks, by the suffix."""
     if suffix.lower() == ".json":
         path.write_text(json.dumps(pairs.tolist()), encoding="utf-8")
         return
