@@ -7,8 +7,9 @@ import numpy as np
 from bpy_extras import view3d_utils
 
 from ..blender import mesh_arrays
-from ..blender.object_references import ObjectReference
+from ..blender.object_references import ObjectReference, settings_of
 from ..blender.splat_layouts import holds_splats
+from ..carried import carried_objects
 from ..core.geometry.spaces import inverse, transform
 from ..field_modifier import motion
 from ..handles.empties import matrix_of
@@ -113,9 +114,14 @@ def surface(context, view, lights):
         return splat
     if not met or not pins.is_own(item.original) or matrix != item.original.matrix_world:
         return None
-    source, location = item.original, np.array(location)
+    source = carrier_of(item.original)
+    if source is not None:
+        location, normal, face = beneath(source.evaluated_get(depsgraph), view.ray(), location)
+    else:
+        source = item.original
     if pins.refusal(source) is not None:
         return Target("REFUSED", ObjectReference(source))
+    location = np.array(location)
     radius = context.scene.arapfields.pin_radius * screen.pixel_size(view.perspective, view.size, location)
     mesh = source.evaluated_get(depsgraph).data
     return Target(
@@ -128,6 +134,25 @@ def surface(context, view, lights):
         face_count=len(mesh.polygons),
         lit=lit(mesh, matrix_of(source), location, radius) if lights else None,
     )
+
+
+def carrier_of(item):
+    """The visible mesh that carries an object without handles of its own, or None."""
+    settings = settings_of(item)
+    carrier = settings.carried_by
+    if carrier is None or carried_objects.find(carrier, item) is None or len(settings.handles):
+        return None
+    return carrier if carrier.visible_get() and carrier.type == "MESH" and carrier.data.polygons else None
+
+
+def beneath(carrier, ray, location):
+    """(location, normal, face) of an evaluated mesh along a line of sight, or nearest to a location."""
+    world = carrier.matrix_world
+    local = world.inverted_safe()
+    met, place, normal, face = carrier.ray_cast(local @ ray[0], local.to_3x3() @ ray[1])
+    if not met:
+        _, place, normal, face = carrier.closest_point_on_mesh(local @ location)
+    return world @ place, (local.to_3x3().transposed() @ normal).normalized(), face
 
 
 def splat_under(context, view):
