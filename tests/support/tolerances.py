@@ -14,7 +14,7 @@ FLOAT64_GRADIENT = 1e-8
 FLOAT64_ROTATION = 1e-13
 # The same energies in float32 (rounding 6e-8) after some hundred operations.
 FLOAT32_ENERGY = 2e-5
-# g(n_k) = 1: what the refined solution of the linear system leaves.
+# g(n_k) = 1: residual of the linear system after refinement.
 GAUSS_WEIGHTS = 1e-10
 # Distances against libigl's, as a share of the bounding box's diagonal: both are exact to rounding.
 DISTANCE = 1e-12
@@ -22,7 +22,7 @@ DISTANCE = 1e-12
 # may differ; on open ones the boundary is where the winding number passes 1/2, which both approximate.
 SIGN_AGREEMENT_CLOSED = 0.9999
 SIGN_AGREEMENT_OPEN = 0.999
-# Winding numbers against sums of solid angles: what the multipoles leave out.
+# Winding numbers against sums of solid angles: truncation of the multipole expansion.
 WINDING = 1e-3
 # Published networks in single precision against PyTorch in double.
 PUBLISHED_VALUE = 1e-5
@@ -31,13 +31,13 @@ PUBLISHED_GRADIENT = 1e-4
 FIT_REPORT = 0.15
 # A live solver at rest against the identity, in the unit cube: rounding times a hundred centers.
 LIVE_IDENTITY = 1e-8
-# A pose solved again after others, as a share of the shape's length: what the last steps still gain.
+# A pose solved again after others, as a share of the shape's length: progress of the last steps.
 LIVE_DRIFT = 1e-4
 # Share of the minimised value by which rounding may raise it: the first steps are taken in single precision.
 LIVE_ROUNDING = 1e-5
-# Share of one step of a drag by which shapes of three iterations may be behind: less than a picture's delay.
+# Share of a drag's step by which shapes after three iterations may be behind: less than a frame's delay.
 LIVE_KEEPS_UP = 0.5
-# Energy on a drag's way back over that of a solver which goes to the pose at once: steps end at 2e-4 of it.
+# Energy at the end of a drag back over that of a direct solve of the pose: steps end at 2e-4 of it.
 LIVE_WAY_BACK = 1.05
 # Single-precision fields against differences of fourth order with step 2e-3: rounding over the step, and
 # truncation where the encoding's highest octave bends most.
@@ -46,7 +46,7 @@ FLOAT_FIELD_DIFFERENCES = 1e-3
 NEWTON_INVERSE = 1e-6
 # Exact handles: rounding of single precision on lengths of order one.
 EXACT_HANDLE = 1e-6
-# Energies of a field and of the same field turned rigidly: rounding of the turn alone.
+# Energies of a field and of the same field rotated: rounding of the rotation.
 RIGID_INVARIANCE = 1e-10
 # Slopes of whole losses: eighth-order differences with step 5e-3 of a function with kinks in its third
 # derivative (barrier, fall-off), relative.
@@ -58,24 +58,24 @@ ON_SURFACE = 1e-4
 
 TRACKED = 5e-4  # single precision; large coefficients of neighbouring centers of opposite sign cancel
 
-# Energies composed of libtorch's operations against the kernels, both in float64: rounding over the smallest
+# Energies composed of libtorch operations against the kernels, both in float64: rounding over the smallest
 # sum of two singular values, which the tests keep above 1e-3.
 COMPOSED = 1e-10
 # Sixty steps of descent in single precision along the two: rounding, amplified by optimizers that turn small
 # gradients into steps of full length. Seen: 1e-6 (orthogonal), 2e-4 (Adam), 6e-3 (exact handles).
 COMPOSED_SOLVE = 0.02
-# What Jordan's five polynomials leave of singular values from 0.01 to 1: they end in [0.68, 1.21].
+# Singular values from 0.01 to 1 after Jordan's five polynomials: they end in [0.68, 1.21].
 EVENED = 0.35
-# Singular vectors through a step in double precision.
+# Singular vectors after a step in double precision.
 SAME_VECTORS = 1e-9
-# A solve with products rounded to bfloat16 against one without: what noise of 2e-3 in a product costs.
+# A solve with products rounded to bfloat16 against one without: effect of a noise of 2e-3 in products.
 ROUNDED_SOLVE = 0.1
 # How many times as long a call may take beside as many busy processes as there are processors: fair is 2, the
-# rest is what threads that wait for each other lose to the scheduler.
+# rest is the scheduling delay of threads that wait for each other.
 BUSY_SLOWDOWN = 2.5
-# The weighted terms of a loss add up to it, in another order.
+# The weighted terms of a loss against the loss: another order of the sum.
 TERMS_OF_LOSS = 1e-9
-# An energy of ours, written in Python in double precision, against the kernel in single: of the loss.
+# An energy in Python in double precision against the kernel in single precision, relative to the loss.
 ENERGY_IN_PYTHON = 1e-4
 # Central differences over 1e-3 of the cube, against the exact gradient of a smooth function.
 FUNCTION_DIFFERENCES = 1e-5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Animated bars, and bakes that are stepped by hand."""
+"""Animated bars, and bake operators whose coroutine a test steps."""
 
 import tempfile
 import types
@@ -31,7 +31,7 @@ def animated(name="Bar"):
 
 
 def stepped(kind=bake.ARAPFIELDS_OT_bake, **given):
-    """An operator that bakes as a window runs it, to be stepped by hand; a plain object has its arguments."""
+    """A stand-in for a bake operator in a window, as a plain object; tests step its coroutine."""
 
     class Operator(bake.CacheOperator):
         title, in_window, scope, filepath = kind.title, False, "ACTIVE", given.pop("filepath", "")
@@ -48,7 +48,7 @@ def stepped(kind=bake.ARAPFIELDS_OT_bake, **given):
 
 
 def cancelled_at(operator, stage):
-    """Steps it, cancels it when it says this, and returns what the operator does."""
+    """Runs an operator's coroutine, cancels the job when its message contains `stage`; returns the result."""
     coroutine = operator.coroutine(bpy.context)
     try:
         while True:
@@ -63,7 +63,7 @@ def cancelled_at(operator, stage):
 
 
 def changed_at_work(operator, change):
-    """Steps it, changes something while its worker runs, and goes on to its end."""
+    """Runs an operator's coroutine to its end, and calls `change` while the worker runs."""
     coroutine = operator.coroutine(bpy.context)
     while next(coroutine) is not Pause.WORKER:
         pass
@@ -89,7 +89,7 @@ def at(item, frame):
 
 
 def solved(source, frame, kind="DEFORM"):
-    """(n, 3) the solver's own answer at a frame, in local coordinates."""
+    """(n, 3) local points of a frame, directly from the solver."""
     reader = SourceReader(bpy.context, source, kind, in_place=True)
     run_to_completion(reader.read_setup(bpy.context))
     whole = int(frame // 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Blenders at hand besides the bpy of this environment; `make blenders` sets up what PyPI has.
+"""Other Blender versions than this environment's bpy; `make blenders` installs those on PyPI.
 
 ARAPFIELDS_BLENDERS   folder of virtual environments with a bpy each, `4.2`, `5.2` (default build/blenders)
 ARAPFIELDS_BLENDER52  root folder of a system with a Blender 5.2 (default /opt/blender52), entered by chroot
@@ -25,20 +25,20 @@ NAMES = ["4.5", "4.2", "4.2 with NumPy 2", "5.2", "5.2 in its window's build"]
 
 @dataclass
 class Blender:
-    """How to run a Python script in one Blender, and where the user folder and files for it lie."""
+    """One Blender: how to run scripts in it, and the folder of its user settings and files."""
 
     command: list
-    folder: Path  # for the user folder and files, as seen from here
-    root: Path = Path("/")  # of the system that it runs in
-    libtorch: str = ""  # another libtorch_cpu.so there
+    folder: Path  # for user settings and files, as a path of this system
+    root: Path = Path("/")  # root of the system that it runs in
+    libtorch: str = ""  # path of another libtorch_cpu.so there
     environment: dict = field(default_factory=dict)
 
     def inside(self, path):
-        """The path as that system sees it."""
+        """The path within that Blender's root."""
         return str(Path("/") / path.relative_to(self.root))
 
     def bring(self, path):
-        """The file, where that Blender can see it."""
+        """Copies the file to where that Blender can read it; returns that path."""
         if self.root == Path("/"):
             return path
         copy = self.folder / path.name
@@ -52,7 +52,7 @@ class Blender:
         return self.call([*command, *arguments], check)
 
     def program(self, *arguments, check=True):
-        """Runs Blender itself as a user does, with what is installed and enabled."""
+        """Runs the Blender program with the user's extensions."""
         return self.call([*self.command[: self.command.index("blender") + 1], *arguments], check)
 
     def call(self, command, check):
@@ -76,7 +76,7 @@ def python_of(name):
 
 
 def find(name, folder):
-    """The Blender of that name; skips the test where it is not at hand."""
+    """The Blender of that name; skips the test if it is not installed."""
     if name == "4.5":
         require_bpy()
         return Blender([sys.executable], folder)
@@ -87,7 +87,7 @@ def find(name, folder):
         return Blender([str(python_of("4.2"))], folder, environment={"PYTHONPATH": str(numpy)})
     if name == "4.2":
         return Blender([str(python_of(name))], folder)
-    if name == "5.2":  # PyPI's torch for its Python is large: the C++ library of ours stands for it
+    if name == "5.2":  # PyPI's torch for its Python is large: our environment's C++ library is loaded instead
         torch = importlib.util.find_spec("torch")
         library = str(Path(torch.origin).parent / "lib/libtorch_cpu.so") if torch else ""
         return Blender([str(python_of(name))], folder, libtorch=library)

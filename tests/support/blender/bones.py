@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Handles of bones as the solver gets them."""
+"""Native handles of bones."""
 
 import bpy
 from support.blender import scenes
@@ -14,7 +14,7 @@ from addon.handles.native_handles import native_handles
 
 
 def handles_of(bar):
-    """[(samples that it holds, its (4, 4) motion)] of the bar's handles, as the solver gets them."""
+    """[(indices of its samples, its (4, 4) motion)] of the bar's native handles."""
     space, mesh = space_of(bar.matrix_world), mesh_arrays.read(bpy.context, bar, in_place=True)
     reading = vertex_groups.read_weights(bpy.context, bar, empties.group_names(bar), in_place=True)
     handles = empties.solve_handles(bar, space, run_to_completion(reading))
@@ -23,7 +23,7 @@ def handles_of(bar):
 
 
 def rigged_bar(with_groups=True):
-    """(bar, rig): a bar whose two bones bend it in the middle, by its armature modifier."""
+    """(bar, rig): a bar and an armature of two bones, which deforms it by a modifier `with_groups`."""
     bar = scenes.bar()
     if with_groups:
         add_modifier(bar, "ARMATURE")

@@ -19,7 +19,7 @@ from dressing import link, rig, seen_mesh, strands, weigh
 
 HEIGHT = 1.8
 EYE, EYES = 0.032, [(side * 0.055, -0.118, 1.68) for side in (-1, 1)]
-LOOSE = 0.02  # of the shirt, from the skin
+LOOSE = 0.02  # distance of the shirt from the skin
 PARTS = [
     ((0, 0, 0.85), (0, 0, 1.28), 0.16),
     ((0, 0, 1.2), (0, 0, 1.55), 0.065),
@@ -87,7 +87,7 @@ def hat():
 
 
 def build():
-    """The character at rest, in T-pose, its bones handles of the body, all else carried."""
+    """The character at rest in T-pose: its bones are handles of the body, which carries the other objects."""
     body = link("Body", half_body())
     person = SimpleNamespace(body=body, rig=rig(BONES))
     weigh(body, BONES)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In the Blender worker: a verb of the extension's command line, as by `blender --command arapfields`."""
+"""Runs a verb of the extension's command line in the Blender worker."""
 
 import contextlib
 import io

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bar that is pressed onto a block."""
+"""A live bar pressed onto a block."""
 
 import bpy
 import numpy as np
@@ -12,8 +12,8 @@ from .stacks import local_points
 
 
 def pressed():
-    """A live bar of which one end goes down, and a block below it."""
-    setup.SAMPLES = 3000  # a live solver's own: fewer leave gaps for a corner to pass
+    """A live bar with one end moved down onto a block."""
+    setup.SAMPLES = 3000  # as many as live solvers have by default: between fewer samples a corner could pass
     bar, _, moving = scenes.bar_with_handles()
     low = (bar.matrix_world @ bar.data.vertices[0].co).z
     for vertex in bar.data.vertices:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests marked `in_blender`: their bodies run in the Blender worker, their outcomes are pytest's.
+"""Tests marked `in_blender`: their bodies run in the Blender worker, pytest reports the outcomes.
 
-A file of such tests is loaded twice: by pytest, which has no Blender, and by the worker. What only Blender
-has is imported `if IN_BLENDER`. Arguments of such a test must be JSON, or the path `tmp_path`.
+A file of such tests is imported twice: by pytest, without Blender, and by the worker. Modules that exist only
+in Blender are imported `if IN_BLENDER`. Arguments of such tests must be JSON, or `tmp_path`.
 """
 
 import importlib.util
@@ -14,6 +14,6 @@ IN_BLENDER = "bpy" in sys.modules
 
 
 def require_bpy():
-    """Skips the test where PyPI's bpy is absent, without loading it into this process."""
+    """Skips the test if bpy is not installed, without importing it."""
     if importlib.util.find_spec("bpy") is None:
         pytest.skip("PyPI's bpy is not installed")

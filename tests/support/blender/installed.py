@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run in a Blender of its own: installs the extension from a zip, uses it, switches it off, removes it.
+"""Script for a separate Blender: installs the extension from a zip, uses, disables and removes it.
 
 blender --background --python installed.py -- ZIP [--torch before|after] [--library LIBTORCH_CPU]
 python installed.py ZIP …
@@ -18,7 +18,7 @@ MODULE = "bl_ext.user_default.arapfields"
 
 
 class FromTheExtension:
-    """Finds arapfields in the user folder alone, not in an environment where it may be installed as well."""
+    """Import finder that finds arapfields only in the user folder, not in the environment."""
 
     @staticmethod
     def find_spec(name, path=None, target=None):
@@ -40,7 +40,7 @@ def arguments():
 
 
 def other_torch(library):
-    """Another add-on's torch: trains with it; where there is only its C++ library, loads that likewise."""
+    """Uses torch as another add-on would: trains with it, or loads only its C++ library."""
     if library:
         ctypes.CDLL(library)
         return
@@ -138,5 +138,5 @@ if __name__ == "__main__":
     import bpy
 
     if not hasattr(bpy.app, "module") and not bpy.app.binary_path:
-        # The bpy of 4.2 drops a removed add-on's callbacks (update=) after Python has ended, and crashes.
+        # bpy 4.2 frees update callbacks of a removed add-on after Python's end, and crashes.
         os._exit(0)

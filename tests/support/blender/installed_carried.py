@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run in a Blender of its own, as installed.py is: the extension from a zip carries all kinds of objects,
-live, through undo, in a render at a frame and in a bake, which plays on without the extension.
+"""Script for a separate Blender: the extension from a zip carries all kinds of objects in live mode,
+through undo, in a render at a frame and in a bake, which plays without the extension.
 
 blender --background --python installed_carried.py -- ZIP
 """
@@ -15,7 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from support.blender import installed
 
-NEAR = 0.12  # to the handle's own motion, of a bar of length 2: the field is no rigid motion
+NEAR = 0.12  # largest difference to the handle's motion, for a bar of length 2: the field is not rigid
 
 
 def check(items, rest, shift, what):
@@ -80,7 +80,7 @@ def use():
 
 
 def render(frame):
-    """One frame by Cycles; without a window Blender renders only where it finds libEGL."""
+    """Renders one frame by Cycles; without a window Blender renders only if it finds libEGL."""
     if bpy.app.background and ctypes.util.find_library("EGL") is None:
         print("NOT RENDERED: no libEGL")
         return
@@ -105,4 +105,4 @@ if __name__ == "__main__":
     print(f"CARRIED {bpy.app.version_string}")
     sys.stdout.flush()
     if not hasattr(bpy.app, "module") and not bpy.app.binary_path:
-        os._exit(0)  # as in installed.py
+        os._exit(0)  # see installed.py

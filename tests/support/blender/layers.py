@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bars that are styled and then moved further."""
+"""Bars that are stylized and then deformed."""
 
 import bpy
 import numpy as np
@@ -8,11 +8,11 @@ from support.blender.stacks import add_modifier
 
 QUICK = {"field": "radial", "samples": 500}
 STYLE = {"style": "CUBE", "field": "radial", "samples": 500}
-SAME = 2e-6  # of a bar of two: single precision of offsets that are added
+SAME = 2e-6  # for a bar of length 2: single precision of added offsets
 
 
 def with_handles(bar):
-    """The bar held at its left end, with a handle at the right: the latter."""
+    """Adds handles at both ends of a bar; returns the right one."""
     boxes = [scenes.cube_empty((x, 0, 0), (0.3, 0.6, 0.6), str(x)) for x in (-1, 1)]
     bpy.context.view_layer.update()
     scenes.activate(*boxes, bar)
@@ -22,7 +22,7 @@ def with_handles(bar):
 
 
 def styled(stack=(), **further):
-    """(a bent bar, its points by a style, and those before)."""
+    """(a bent bar, its stylized points, its points before)."""
     bar = scenes.bar()
     bar.data.vertices.foreach_set("co", np.ravel([bend(v.co) for v in bar.data.vertices]))
     for kind in stack:
@@ -40,7 +40,7 @@ def bend(point):
 
 
 def structure(item):
-    """All but the shape that must be as it was."""
+    """Everything except the shape that must not change, comparable."""
     settings = item.arapfields
     modifiers = [(m.name, m.type, m.show_viewport) for m in item.modifiers]
     modifiers += [m.node_group.name for m in item.modifiers if m.type == "NODES"]

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stepping live sources, as their timer does."""
+"""Steps live sources, as their timer does."""
 
 import bpy
 
 from addon.live import sessions
 
-WAIT = 300  # seconds for a shape to follow on a busy machine
+WAIT = 300  # seconds to wait for a shape on a busy machine
 
 
 def step(refined=False):

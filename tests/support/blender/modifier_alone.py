@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run in any Blender, without the native library: the modifier with offsets of our own, and its inputs.
+"""Script for any Blender, without the native library: the modifier and its inputs, with given offsets.
 
 blender -b --factory-startup --python tests/support/blender/modifier_alone.py
 or with PyPI's bpy: python tests/support/blender/modifier_alone.py
@@ -61,7 +61,7 @@ def check_inputs():
 
 
 def check_helper():
-    """After Mirror, through a file; the copied object keeps it, and a motion of its own leaves the first."""
+    """A helper after Mirror survives a file; a copy of the object shares it until it has its own motion."""
     bar = scenes.bar("Mirrored")
     mirror = bar.modifiers.new("Mirror", "MIRROR")
     mirror.use_axis, mirror.use_mirror_merge = (False, False, True), False

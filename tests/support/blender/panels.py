@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drawing all panels without a window."""
+"""Draws all panels without a window."""
 
 import bpy
 from support.blender import scenes
@@ -10,7 +10,7 @@ from addon.core.runtime import jobs, native
 
 
 class Layout:
-    """Stands for Blender's: checks what it is asked to show, and notes the texts."""
+    """Replaces Blender's layout: checks the arguments of calls, and collects the texts."""
 
     def __init__(self, texts):
         self.__dict__["texts"] = texts
@@ -69,13 +69,13 @@ class Layout:
 
 
 def shown():
-    """The sections that show."""
+    """The panels that are shown."""
     classes = [cls for module in registration.MODULES for cls in getattr(module, "CLASSES", [])]
     return [cls for cls in classes if issubclass(cls, bpy.types.Panel) and cls.poll(bpy.context)]
 
 
 def drawn():
-    """The texts of all sections that show, by section; menus are drawn as well."""
+    """{panel: texts} of all shown panels; menus are drawn as well."""
     sections = {}
     for module in registration.MODULES:
         for cls in getattr(module, "CLASSES", []):
@@ -93,7 +93,7 @@ def drawn():
 
 
 def prepared(state):
-    """Puts Blender into that state; returns what puts it back."""
+    """Puts Blender into a state; returns a function that restores it."""
     if state == "a camera":
         bpy.ops.object.camera_add()
     if state in ("nothing", "a camera"):

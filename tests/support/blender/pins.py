@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pins placed and dragged as the pin tool does."""
+"""Places and drags pins, as the pin tool does."""
 
 import bpy
 import numpy as np
@@ -10,7 +10,7 @@ from addon.pin_tool import drag
 
 
 def pin(source, location, radius=0.15, target=None, **further):
-    """Places a pin at a location as shown, and drags it to a target; its Empty."""
+    """Places a pin at a location of the shown surface, and drags it to a target; returns its Empty."""
     dragged = drag.of_new_pin(bpy.context, source, np.array(location, float), radius, **further)
     if target is not None:
         dragged.move(bpy.context, target)
@@ -21,7 +21,7 @@ def pin(source, location, radius=0.15, target=None, **further):
 
 
 def state(source):
-    """All that a cancelled drag must leave as it was."""
+    """Everything that a cancelled drag must not change, comparable."""
     settings, layer = source.arapfields, bpy.context.view_layer
     handles = [(e.empty.name, e.kind, e.anchor, tuple(e.rest), tuple(e.colour)) for e in settings.handles]
     empties = [

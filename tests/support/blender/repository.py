@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run in a Blender of its own: adds a repository of extensions by its address, installs from it, removes all.
+"""Script for a separate Blender: adds an extension repository by its URL, installs from it, removes both.
 
 python repository.py file:///…/index.json
 """
@@ -10,7 +10,7 @@ import sys
 def main(address):
     import bpy
 
-    bpy.context.preferences.system.use_online_access = True  # asked even of file://
+    bpy.context.preferences.system.use_online_access = True  # required even for file://
     bpy.ops.preferences.extension_repo_add(name="Ours", type="REMOTE", remote_url=address)
     repos = bpy.context.preferences.extensions.repos
     where, module = {"repo_index": len(repos) - 1}, f"bl_ext.{repos[-1].module}.arapfields"
@@ -28,4 +28,4 @@ if __name__ == "__main__":
     sys.stdout.flush()
     import os
 
-    os._exit(0)  # the bpy of 4.2 crashes while it ends: see installed.py
+    os._exit(0)  # bpy 4.2 crashes at its end: see installed.py

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects of each kind that a bar carries at its right end, and where they are seen."""
+"""Objects of each kind, carried by a bar at its right end, and their evaluated points."""
 
 import bpy
 import numpy as np
@@ -9,7 +9,7 @@ import arapfields
 
 
 def body():
-    """(bar, moving): a bar whose right end a handle will move, with nothing carried yet."""
+    """(bar, moving): a bar that carries nothing, and the handle of its right end."""
     bar, _, moving = scenes.bar_with_handles()
     return bar, moving
 
@@ -24,7 +24,7 @@ def link(name, data, location=(0, 0, 0)):
 def rider(kind):
     """An object of that kind at the right end of the bar."""
     points = np.array([(0.9, 0.1, 0.27), (1.0, -0.1, 0.3), (0.95, 0.0, 0.35), (1.0, 0.1, 0.4)])
-    at = np.array((0.2, 0.0, 0.1))  # where the object's origin is
+    at = np.array((0.2, 0.0, 0.1))  # the object's origin
     if kind == "MESH":
         mesh = bpy.data.meshes.new("Patch")
         mesh.from_pydata((points - at).tolist(), [], [(0, 1, 2, 3)])
@@ -66,7 +66,7 @@ def rider(kind):
 
 
 def shown(item):
-    """(n, 3) where an object's points are seen, in world space."""
+    """(n, 3) evaluated points of an object, in world space."""
 
     bpy.context.view_layer.update()
     seen = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -90,5 +90,5 @@ def shown(item):
 
 
 def taken(session, points):
-    """Where a live session's field takes (n, 3) points."""
+    """(n, 3) points moved by a live session's field."""
     return arapfields.Attachment(session.solver.samples, points).positions(session.solver.field)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scenes for tests inside Blender: small, textured, with everything on the mesh that must survive."""
+"""Scenes for tests in Blender: small meshes, some with all kinds of data that must be kept."""
 
 import tempfile
 
@@ -58,7 +58,7 @@ def bar_with_handles(name="Bar"):
 
 
 def from_another_file(*items):
-    """The objects, moved to a file of their own and linked from there into the scene."""
+    """Writes the objects to another file, removes them, and links them from it."""
     names, path = [item.name for item in items], f"{tempfile.mkdtemp()}/other.blend"
     bpy.data.libraries.write(path, set(items))
     for item in items:
@@ -72,7 +72,7 @@ def from_another_file(*items):
 
 
 def camera(size=48):
-    """A small picture by Cycles, which needs no graphics card, from the front."""
+    """Adds a camera in front, and sets up small renders by Cycles, which needs no GPU."""
     scene = bpy.context.scene
     lens = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     lens.data.type, lens.data.ortho_scale = "ORTHO", 3.2
@@ -89,7 +89,7 @@ def camera(size=48):
 
 
 def world_points(item):
-    """(n, 3) vertices of an object as shown, in world space."""
+    """(n, 3) evaluated vertices of an object, in world space."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = item.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
@@ -101,7 +101,7 @@ def world_points(item):
 
 
 def decorate(item):
-    """UVs, colours, materials, groups, flags and custom attributes, all different from one another."""
+    """Adds UVs, colors, materials, groups, flags and custom attributes with varied values."""
     mesh, rng = item.data, np.random.default_rng(0)
     uv = mesh.uv_layers.new(name="UV")
     uv.data.foreach_set("uv", rng.random(2 * len(mesh.loops)).astype(np.float32))
@@ -139,7 +139,7 @@ SIZES = {"vector": {"FLOAT_VECTOR": 3, "FLOAT2": 2}, "color": {"BYTE_COLOR": 4, 
 
 
 def everything(item):
-    """All that is on an object's mesh except positions, comparable: {name: bytes or list}."""
+    """{name: bytes or list} of all data of an object's mesh except positions, comparable."""
     mesh, contents = item.data, {}
     for attribute in mesh.attributes:
         if attribute.name == "position":
@@ -172,7 +172,7 @@ def set_positions(mesh, points):
 
 
 def delete(item):
-    """As the user does: unlinked from the scene, while pointers keep the data alive."""
+    """Deletes an object as a user does: unlinks it, while pointers may keep the data-block."""
     for home in item.users_collection:
         home.objects.unlink(item)
     bpy.context.view_layer.update()

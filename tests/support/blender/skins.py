@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A body with two legs, its armature, cloth and an eye, to be skinned."""
+"""A body with two legs, an armature, cloth and an eye, for skinning."""
 
 import bpy
 import numpy as np
@@ -25,7 +25,7 @@ def mesh_of(name, vertices, triangles):
 
 
 def person(half=False):
-    """(body, rig): all of the body, or what has x ≥ 0."""
+    """(body, rig): the whole body, or its half with x ≥ 0."""
     vertices, triangles = af.extract_surface(trousers(), 24)[:2]
     if half:
         triangles = triangles[(vertices[triangles][:, :, 0] > -1e-6).all(axis=1)]
@@ -52,7 +52,7 @@ def person(half=False):
 
 
 def rest_rig(rig, change):
-    """Changes the bones at rest: change(edit_bones)."""
+    """Calls change(edit_bones) in Edit Mode."""
     scenes.activate(rig)
     bpy.ops.object.mode_set(mode="EDIT")
     change(rig.data.edit_bones)
@@ -61,7 +61,7 @@ def rest_rig(rig, change):
 
 
 def shirt(body):
-    """A band of the body's surface, a little off it."""
+    """A band of the body's surface, moved outwards a little."""
     points = scenes.world_points(body)
     body.data.calc_loop_triangles()
     triangles = np.array([t.vertices for t in body.data.loop_triangles])

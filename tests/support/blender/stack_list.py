@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stacks of modifiers with the field's own among them."""
+"""Modifier stacks that include the field modifier."""
 
-STACKS = {  # modifiers, with FIELD where the field's own is; "keys": shape keys
+STACKS = {  # FIELD: the field modifier; "keys": shape keys
     "alone": ["FIELD"],
     "subdivision after": ["FIELD", "SUBSURF"],
     "subdivision before": ["SUBSURF", "FIELD"],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bars with modifiers of other kinds, deformed by the field's modifier, and the same by hand."""
+"""Bars with several modifiers and the field modifier, and their expected shapes."""
 
 import bpy
 import numpy as np
@@ -26,7 +26,7 @@ def armature():
 
 
 def add_modifier(bar, kind):
-    """A modifier of that kind which does something."""
+    """Adds a modifier of that kind that changes the shape."""
     if kind == "keys":
         bar.shape_key_add(name="Basis")
         key = bar.shape_key_add(name="Wide")
@@ -53,7 +53,7 @@ def add_modifier(bar, kind):
 
 
 def reading_nodes(item, read):
-    """A modifier of nodes that pass the geometry on, with the object `read` as an input."""
+    """Adds a Geometry Nodes modifier without effect that has the object `read` as an input."""
     group = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
@@ -68,7 +68,7 @@ def reading_nodes(item, read):
 
 
 def build(stack):
-    """A bar with this stack, deformed as a user does; (bar, moving, field as a map of local points)."""
+    """Deforms a bar with this stack by operators; returns (bar, moving, field as a map of local points)."""
     bar, _, moving = scenes.bar_with_handles()
     bar.scale, bar.location, bar.rotation_euler.z = (1.0, 1.2, 0.9), (0.1, 0, 0), 0.2
     bpy.context.view_layer.update()
@@ -107,7 +107,7 @@ def local_points(item):
 
 
 def by_hand(bar, field, share=1.0):
-    """(n, 3) what the stack must give: what is before the field applied, moved, what comes after it left."""
+    """(n, 3) expected points: the earlier modifiers applied, moved by the field, then the later modifiers."""
     copied = bar.copy()
     bpy.context.collection.objects.link(copied)
     names = [modifier.name for modifier in bar.modifiers]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An object at each stage of its use, idle, in a job, live, in a bake, and what users do to it meanwhile."""
+"""An object while it is idle, live, or in a job or bake, and actions of users meanwhile."""
 
 import contextlib
 import tempfile
@@ -16,14 +16,14 @@ from addon.deform.operators import ARAPFIELDS_OT_deform
 from addon.live import sessions
 from addon.solver import setup
 
-LIFT = 0.4  # of the moving handle, in the height of the world
-ENDS_WORK = {"undone", "redone", "reloaded"}  # whatever works on the file, as before_undo and before_load say
-CANCELLED = {"job": "Deform cancelled", "bake": "Bake cancelled"}  # as an undo says, until the next step
+LIFT = 0.4  # motion of the moving handle along the world's z
+ENDS_WORK = {"undone", "redone", "reloaded"}  # stop jobs and bakes, by before_undo and before_load
+CANCELLED = {"job": "Deform cancelled", "bake": "Bake cancelled"}  # message after an undo
 
 
 @contextlib.contextmanager
 def watched():
-    """A list of the errors that our handlers of Blender's raise, which Blender itself only prints."""
+    """Context manager: a list of exceptions of the add-on's handlers, which Blender only prints."""
     errors, kept = [], {}
 
     def noting(function):
@@ -48,7 +48,7 @@ def watched():
 
 
 class Operator:
-    """A job's operator, stepped as a window steps it; `said` is what it reports."""
+    """Stand-in for a job's operator in a window; tests step its coroutine; `said`: its reports."""
 
     def __init__(self, cls, **values):
         self.__dict__.update(vars(type("Values", (), values)))
@@ -65,7 +65,7 @@ class Operator:
 
 
 class Stage:
-    """One stage of the bar's use: `begin` enters it, `end` sees it through and tells what was said."""
+    """A stage of the bar's use: `begin` enters it, `end` completes it and returns the messages."""
 
     def __init__(self, name):
         self.name = name
@@ -96,13 +96,13 @@ class Stage:
         return Operator(ARAPFIELDS_OT_deform, **scenes.QUICK)
 
     def start(self, operator):
-        """Runs the job until its worker has set out."""
+        """Runs the job until its worker has started."""
         self.running, self.coroutine = operator, operator.coroutine(bpy.context)
         while next(self.coroutine) is not Pause.WORKER:
             pass
 
     def end(self):
-        """What was said, in one text."""
+        """Completes the stage; returns all messages as one text."""
         bpy.context.view_layer.update()
         if self.name == "live":
             for _ in range(3):
@@ -110,7 +110,7 @@ class Stage:
             return all_said()
         if self.name == "idle":
             return ""
-        if jobs.running() is None:  # ended from outside, as the window's operator then sees
+        if jobs.running() is None:  # stopped, as the operator in a window notices
             self.coroutine.close()
             return all_said()
         try:
@@ -125,7 +125,7 @@ def all_said():
 
 
 def deleted(item):
-    """As the user does it: unlinked, while pointers keep the data alive."""
+    """Deletes the object as a user does: unlinks it, while pointers may keep the data-block."""
     for home in item.users_collection:
         home.objects.unlink(item)
 
@@ -146,13 +146,13 @@ def hidden(item):
 
 
 def linked(item):
-    """Its data in a second object, and itself in a second scene."""
+    """Links the object's data to a second object, and the object to a second scene."""
     bpy.context.collection.objects.link(bpy.data.objects.new("Second", item.data))
     bpy.data.scenes.new("Another").collection.objects.link(item)
 
 
 def overridden(item):
-    """Replaced by a library override of itself from another file."""
+    """Replaces the object by a library override of it from another file."""
     path, name = tempfile.mktemp(suffix=".blend"), item.name
     bpy.data.libraries.write(path, {item}, fake_user=True)
     deleted(item)
@@ -192,7 +192,7 @@ ACTIONS = {
 
 
 def source():
-    """The object with the handles that is in the scene and not a copy, or None."""
+    """The source in the scene, not its copy; or None."""
     names = ("Other Name", "Bar")
     return next((bpy.context.scene.objects[name] for name in names if is_source(name)), None)
 
@@ -201,11 +201,11 @@ def is_source(name):
     item = bpy.context.scene.objects.get(name)
     if item is None or item.type != "MESH" or item.override_library is not None or item.library:
         return False
-    return bool(item.arapfields.handles)  # no result that was given the name
+    return bool(item.arapfields.handles)  # a result of that name has none
 
 
 def after(action, stage, which, said):
-    """What must have come of it."""
+    """Asserts the expected state after an action at a stage."""
     item, gone = source(), which == "source" and action in ("deleted", "overridden")
     if stage == "idle":
         return
@@ -231,7 +231,7 @@ def after(action, stage, which, said):
 
 
 def again():
-    """Live mode goes off, and what is left of the source can be deformed, or says why not."""
+    """Ends live mode, and deforms the source if it is still there."""
     for uid in list(sessions.live):
         sessions.end(bpy.context, sessions.live[uid].source.get())
     item = source()
@@ -243,7 +243,7 @@ def again():
 
 
 def stray():
-    """Names of what nobody sees: live objects, scenes and helper meshes of ours."""
+    """Names of left-over live objects, temporary scenes, unused node groups and live sessions."""
     strays = [item.name for item in bpy.data.objects if item.name.endswith("_live")]
     strays += [scene.name for scene in bpy.data.scenes if scene.name.startswith("ARAP")]
     used = {group.name for group in bpy.data.node_groups if group.users == 0 and "ARAP" in group.name}

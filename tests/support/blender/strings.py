@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every text of the add-on that a user may read, found in its classes and in its source."""
+"""All user-visible texts of the add-on, from its classes and its source."""
 
 import ast
 import inspect
@@ -13,8 +13,8 @@ from addon.pin_tool.tool import ARAPFIELDS_TOOL_pin as tool
 
 ADDON = Path(__file__).resolve().parents[3] / "addon"
 UNTRANSLATED = {"", " ", "X", "Y", "Z", "ARAP Fields", "{error}", "CUDA", "JSON", "Seed"}
-SAYS = {"translated", "UserError", "wrapped"}  # calls whose first argument is read by users
-MENU_ROWS = 2  # place of the text in the rows that menus are made of
+SAYS = {"translated", "UserError", "wrapped"}  # calls whose first argument is visible to users
+MENU_ROWS = 2  # index of the text in the rows of menus
 
 
 def of_classes(modules):
@@ -48,7 +48,7 @@ def annotated(*classes):
 def of_source():
     """Literal texts of messages, buttons and labels."""
     for path in sorted(ADDON.rglob("*.py")):
-        if "commands" in path.parts:  # what a terminal shows is English
+        if "commands" in path.parts:  # texts of the terminal are not translated
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if not isinstance(node, ast.Call):
@@ -81,7 +81,7 @@ def literal(node):
     elif isinstance(node, ast.BoolOp):
         for value in node.values:
             yield from literal(value)
-    elif isinstance(node, ast.JoinedStr):  # only texts that the module completes with its own constants
+    elif isinstance(node, ast.JoinedStr):  # only f-strings of the module's constants
         parts = [v.value if isinstance(v, ast.Constant) else "\0" for v in node.values]
         if "\0" in parts and ADVICE and "ADVICE" in ast.unparse(node):
             yield "".join(part.replace("\0", ADVICE) for part in parts)

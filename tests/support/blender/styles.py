@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A ball to be stylized, and settings for quick styles."""
+"""A ball to stylize, and settings of quick solves."""
 
 import bpy
 

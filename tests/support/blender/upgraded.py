@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run in a Blender of its own: the extension installed over itself while it is loaded, and the next start.
+"""Script for a separate Blender: installs the extension over itself while it is enabled, and the next start.
 
 python upgraded.py ZIP     installs it, uses it, installs it again, uses it, keeps the preferences
-python upgraded.py used    the next start: what was kept is enabled, and is used
-python upgraded.py gone    the next start after installed.py: nothing of it is left
+python upgraded.py used    the next start: the extension is still enabled; uses it
+python upgraded.py gone    the next start after installed.py: the extension is removed
 """
 
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender of its own that runs test functions sent to it, each in an empty file.
+"""A Blender process that runs test functions on request, each in an empty file.
 
 Reads lines of JSON, {"file", "function", "arguments"}, and answers each with one line: "" or a traceback.
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import bpy
 
-SAMPLES = 500  # a twelfth of a live solver's own: these tests do not ask how well it solves
+SAMPLES = 500  # a twelfth of live mode's default: these tests do not check the quality of solves
 
 
 @functools.cache
@@ -32,7 +32,7 @@ def run(order):
     from addon.solver import setup
 
     setup.SAMPLES = SAMPLES
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)  # preferences and other add-ons stay
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)  # keeps preferences and other add-ons
     addon.register()
     try:
         arguments = order["arguments"]
@@ -47,13 +47,13 @@ def run(order):
 
 
 def main():
-    faulthandler.enable()  # a crash names the lines that every thread is at
+    faulthandler.enable()  # prints the stacks of all threads after a crash
     answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # what Blender prints must not pass for an answer
+    os.dup2(2, 1)  # Blender's output must not mix with the answers
     bpy.ops.wm.read_factory_settings(use_empty=True)
     for line in sys.stdin:
         print(json.dumps(run(json.loads(line))), file=answers, flush=True)
-    if os.name == "nt":  # under Wine Blender's libraries may wait for ever for each other's threads
+    if os.name == "nt":  # under Wine the threads of Blender's libraries may deadlock at exit
         ctypes.windll.kernel32.TerminateProcess(ctypes.c_void_p(-1), 0)
 
 

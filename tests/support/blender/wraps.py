@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects to wrap onto each other."""
+"""Objects to wrap, and targets."""
 
 import bpy
 import numpy as np
@@ -13,7 +13,7 @@ SMALL = {"centers": 50, "stages": 3, "iterations": 6, "samples": 1000}
 
 
 def bar_and_target():
-    """A decorated bar, and beside it a thicker, turned one: a scan of a kind."""
+    """(decorated bar, target): the target is a thicker, rotated bar beside it."""
     target = scenes.bar("Scan")
     target.location, target.rotation_euler, target.scale = (3, 1, 0), (0, 0, 0.5), (1.5, 1.8, 1.4)
     item = scenes.bar()
@@ -47,7 +47,7 @@ def rigged_bar():
 
 
 def soup_of(item):
-    """Loose triangles of a thicker, bent bar elsewhere, noisy and with holes, as of a scan."""
+    """An object like a scan: loose, noisy triangles with holes, of a thicker, bent bar elsewhere."""
     rng = np.random.default_rng(0)
     item.data.calc_loop_triangles()
     points = scenes.world_points(item)[[t.vertices for t in item.data.loop_triangles]].reshape(-1, 3)
@@ -95,7 +95,7 @@ def rigged_character():
 
 
 def grown_parts():
-    """The character's capsules as another person's: longer legs, shorter, hanging arms, a thicker trunk."""
+    """The character's capsules in other proportions: longer legs, shorter, hanging arms, a thicker trunk."""
     parts = [
         ((0, 0, 1.0), (0, 0, 1.38), 0.21),
         ((0, 0.02, 1.35), (0, 0, 1.72), 0.075),
@@ -110,7 +110,7 @@ def grown_parts():
     return parts
 
 
-ENDS = {  # of the character and of the other person: crown, hands, feet
+ENDS = {  # points of the character and of grown_parts: crown, hands, feet
     "crown": ((0, 0, 1.84), (0, -0.02, 2.04)),
     "hand": ((0.835, 0, 1.28), (0.70, -0.14, 1.06)),
     "foot": ((0.11, 0, 0.02), (0.2, 0.03, 0.005)),
@@ -125,7 +125,7 @@ def landmarks_of_people():
 
 
 def joints(armature, posed):
-    """(k, 3) heads and tails of the bones in the world, at rest or as they are posed."""
+    """(k, 3) heads and tails of the bones in world space, at rest or posed."""
     bones = armature.pose.bones
     ends = [(b.head, b.tail) if posed else (b.bone.head_local, b.bone.tail_local) for b in bones]
     return np.array([armature.matrix_world @ end for pair in ends for end in pair])

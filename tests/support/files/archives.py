@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Saved fields and signed distances taken apart and put together, independently of the library: as dicts."""
+"""Reads and writes files of fields and signed distances as dicts, independently of the library."""
 
 import json
 import struct
@@ -15,7 +15,7 @@ NAMES = {dtype: name for name, dtype in DTYPES.items()}
 
 
 def read(path):
-    """(texts, arrays): what is under __metadata__, with structure and report parsed, and {name: array}."""
+    """(texts, arrays): __metadata__ with parsed structure and report, and {name: array}."""
     content = Path(path).read_bytes()
     (length,) = struct.unpack("<Q", content[:8])
     header, data = json.loads(content[8 : 8 + length]), content[8 + length :]
@@ -30,8 +30,7 @@ def read(path):
 
 
 def header_of(texts, arrays):
-    """The header's object; arrays lie in the order of the dict. A file of version 2 becomes one of version 1,
-    which has no checksum."""
+    """The header as a dict; arrays are in the dict's order. Version 2 becomes version 1, without checksum."""
     texts = {k: v if isinstance(v, str) else json.dumps(v) for k, v in texts.items() if k != "checksum"}
     if texts.get("version") == "2":
         texts["version"] = "1"
@@ -48,7 +47,7 @@ def header_of(texts, arrays):
 
 
 def joined(header, data):
-    """A file's bytes of a header (an object, or bytes as they are) and the arrays' bytes."""
+    """The content of a file: header (a dict, or raw bytes) and the arrays' bytes."""
     text = header if isinstance(header, bytes) else json.dumps(header).encode()
     return struct.pack("<Q", len(text)) + text + data
 
@@ -58,7 +57,7 @@ def packed(texts, arrays):
 
 
 def make_examples(folder):
-    """One small file of each kind and with each part that files can have: {name: path}."""
+    """{name: path} of small files, one for each kind and each optional part."""
     rng = np.random.default_rng(0)
     folder = Path(folder)
     sizes = [12, 8, 8, 1]
@@ -97,6 +96,6 @@ def make_examples(folder):
 
 
 def load(path):
-    """By the class that the file's name calls for."""
+    """Loads a file by the class for its name."""
     kind = af.NeuralSdf if Path(path).name.startswith("sdf") else af.DeformationField
     return kind.load(path)

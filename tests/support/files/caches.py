@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the tests of point caches share."""
+"""Helpers of tests of point caches."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ POINTS, FRAMES = 7, 5
 
 
 def random_motion():
-    """(FRAMES, POINTS, 3)"""
+    """(FRAMES, POINTS, 3) random positions."""
     return np.random.default_rng(0).normal(size=(FRAMES, POINTS, 3)).astype(np.float32)
 
 

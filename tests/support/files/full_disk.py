@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What stands for a full disk: the system refuses to make files longer."""
+"""Simulates a full disk by the system's limit on file sizes."""
 
 import contextlib
 
 
 @contextlib.contextmanager
 def files_of_at_most(size):
-    """No file of this process gets longer than `size` bytes; None is no limit."""
+    """Limits files of this process to `size` bytes; None: no limit."""
     if size is None:
         yield
         return
-    import resource  # Windows has none
+    import resource  # not on Windows
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))

@@ -7,7 +7,7 @@ import arapfields as af
 
 
 def bar_samples(count=6000, seed=0):
-    """Uniform samples of the surface of a bar of size 4 × 1 × 1 along x, with normals."""
+    """Uniform samples of the bar's surface, with normals."""
     rng = np.random.default_rng(seed)
     half = np.array([2.0, 0.5, 0.5])
     areas = np.array([half[1] * half[2], half[0] * half[2], half[0] * half[1]])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Deformation problems that several tests and benchmarks share: boxes, motions, the bunny's bend, samples."""
+"""Deformation problems of several tests and benchmarks."""
 
 import functools
 
@@ -10,7 +10,7 @@ import arapfields as af
 
 
 def box(low, high):
-    """(4, 4) placing the cube [-1, 1]³ on the box between two corners."""
+    """(4, 4) map of the cube [-1, 1]³ onto the box between two corners."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     matrix = np.diag([*(high - low) / 2, 1.0])
     matrix[:3, 3] = (low + high) / 2
@@ -35,12 +35,12 @@ def shift(offset):
 
 
 def moved(rest, motion=None, **keywords):
-    """A cuboid handle that makes a motion, or stays."""
+    """A cuboid handle with this motion; by default it stays."""
     return af.Cuboid(rest, rest if motion is None else motion @ rest, **keywords)
 
 
 def bar_samples(count=1500, seed=0):
-    """Samples of the box [-0.8, 0.8] × [-0.15, 0.15]² in its own cube: frame identity."""
+    """Samples of the box [-0.8, 0.8] × [-0.15, 0.15]², with frame identity."""
     rng = np.random.default_rng(seed)
     size = np.array([0.8, 0.15, 0.15])
     areas = np.array([size[1] * size[2], size[0] * size[2], size[0] * size[1]])
@@ -54,32 +54,32 @@ def bar_samples(count=1500, seed=0):
 
 
 def bar_handles(degrees=60.0):
-    """The bar's left end held, its right end turned about y."""
+    """Handles that fix the bar's left end and rotate its right end about y."""
     left, right = box([-0.9, -0.3, -0.3], [-0.6, 0.3, 0.3]), box([0.6, -0.3, -0.3], [0.9, 0.3, 0.3])
     return [moved(left), moved(right, turn([0, 1, 0], degrees, (0.0, 0.0, 0.0)))]
 
 
 @functools.cache
 def published_samples(path, count=20000, seed=0):
-    """Uniform samples of a published network's zero set; frame identity."""
+    """Uniform samples of a published network's zero set, with frame identity."""
     sdf = af.NeuralSdf.from_layers(*Network.published(path).layers)
     return af.sample_surface(sdf, count=count, seed=seed)
 
 
 def bunny_handles():
-    """The bend of the method's figures: the bottom held, the ears turned by 70 degrees."""
+    """Handles of the paper's bunny: the bottom is fixed, the ears are rotated by 70 degrees."""
     bottom, ears = box([-1, -1, -1], [1, 1, -0.35]), box([-1, -1, 0.6], [1, 1, 1])
     return [moved(bottom), moved(ears, turn([0, 1, 0], 70, (-0.1, 0, 0.3)))]
 
 
-FINGERS = {  # of the published hand: where each tip is
+FINGERS = {  # fingertips of the published hand
     "thumb": (0.285, -0.378, 0.122), "index": (0.227, -0.258, 0.573), "middle": (0.181, -0.064, 0.741),
     "ring": (0.215, 0.161, 0.625), "little": (0.171, 0.369, 0.362),
 }  # fmt: skip
 
 
 def hand_handles(degrees=40.0):
-    """The published hand's palm held, and the tip of its middle finger taken where the knuckle turns it."""
+    """Handles of the published hand: the palm is fixed, the middle fingertip is rotated about its knuckle."""
     palm, tip = box([-0.5, -0.5, -0.8], [0.06, 0.5, -0.05]), np.array(FINGERS["middle"])
     knuckle = turn([0, 1, 0], degrees, (-0.16, -0.05, 0.12))
     return [moved(palm), af.Point(tip, knuckle[:3, :3] @ tip + knuckle[:3, 3])]

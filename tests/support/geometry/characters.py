@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simple bodies of capsules, with what characters wear: seen by tests of all that a field carries along."""
+"""Simple bodies of capsules, and clothes, for tests of attached geometry."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ import arapfields as af
 
 
 class Capsules(af.ImplicitFunction):
-    """Capsules (start, end, radius) that flow into each other a little."""
+    """Signed distance of capsules (start, end, radius), smoothly blended."""
 
     BLEND = 40.0
 
@@ -16,7 +16,7 @@ class Capsules(af.ImplicitFunction):
         self.parts = [(np.array(a, float), np.array(b, float), float(r)) for a, b, r in parts]
 
     def distances(self, points):
-        """(parts, n) to each capsule."""
+        """(parts, n) distances to each capsule."""
         solids = []
         for start, end, radius in self.parts:
             way = end - start
@@ -30,11 +30,11 @@ class Capsules(af.ImplicitFunction):
         return nearest - np.log(np.exp(-self.BLEND * (distances - nearest)).sum(0)) / self.BLEND
 
 
-LEG, HIP, FOOT, THICKNESS = 0.12, 0.7, 0.05, 0.06  # half the legs' distance, heights, radius
+LEG, HIP, FOOT, THICKNESS = 0.12, 0.7, 0.05, 0.06  # half the legs' distance, heights of their ends, radius
 
 
 def trousers():
-    """Two legs along z under a trunk; half as wide as it is high."""
+    """Two legs along z below a trunk; half as wide as high."""
     parts = [((side * LEG, 0, FOOT), (side * LEG, 0, HIP), THICKNESS) for side in (-1, 1)]
     parts += [((-LEG, 0, HIP), (LEG, 0, HIP), 0.09), ((0, 0, HIP), (0, 0, 1.2), 0.11)]
     return Capsules(parts, af.Frame([0, 0, 0.6], 0.8))
@@ -43,7 +43,7 @@ def trousers():
 def ring(half_width, half_depth, heights, around, flare=0.0):
     """A skirt: vertices (heights · around, 3) of an elliptic tube about z, and its edges (e, 2).
 
-    `flare`: by how much of its width at the highest it is wider at the lowest.
+    `flare`: increase of the width from top to bottom, as a share of the width at the top.
     """
     angles = np.linspace(0, 2 * np.pi, around, endpoint=False)
     wider = 1 + flare * (np.max(heights) - heights) / np.ptp(heights)

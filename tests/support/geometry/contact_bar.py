@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A bar that is pressed onto solids."""
+"""A bar pressed onto solids."""
 
 import numpy as np
 import trimesh
@@ -10,7 +10,7 @@ from .bar import LEFT, RIGHT, turned
 
 QUICK = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=150)
 DEEPEST = 0.004  # 0.1 % of the bar's length
-ALIKE = 0.04  # 1 % of it: what is left where a solve ends a little earlier
+ALIKE = 0.04  # 1 % of it: difference of solves that end a little earlier
 DOWN = turned(0, shift=(0, 0, -0.9))
 DEEP = [LEFT, DOWN @ RIGHT]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A family of seeded poses that press shapes onto obstacles or onto themselves."""
+"""Random poses that press shapes onto obstacles or themselves."""
 
 from dataclasses import dataclass, field
 from functools import cache
@@ -19,17 +19,17 @@ VERTICES = 50_000
 
 @dataclass
 class Solid:
-    """A box (half sizes; turned), a ball (radius) or a sheet (half sizes of a rectangle across its z)."""
+    """A box (half extents), a ball (radius) or a rectangular sheet (half extents) normal to its z axis."""
 
     kind: str
     half: np.ndarray
-    place: np.ndarray  # (4, 4)
+    place: np.ndarray  # (4, 4) transform
 
     def local(self, points):
         return (points - self.place[:3, 3]) @ self.place[:3, :3]
 
     def distance(self, points):
-        """Signed, negative inside, by formulas; of a sheet: how far beyond it, seen from its z."""
+        """Analytic signed distance, negative inside; for a sheet, negative below it along its z axis."""
         x = self.local(points)
         if self.kind == "ball":
             return np.linalg.norm(x, axis=1) - self.half[0]
@@ -59,15 +59,15 @@ class Solid:
 class Case:
     name: str
     shape: str
-    handles: list  # with their targets
+    handles: list  # with targets
     solids: list = field(default_factory=list)
     itself: bool = False
-    frames: int = 0  # in which the obstacles come from `way` off; 0: they rest
+    frames: int = 0  # frames in which the obstacles arrive from the offset `way`; 0: they do not move
     way: tuple = (0.0, 0.0, 0.0)
     functions: list | None = None
 
     def pose(self, share):
-        """Targets at a share of the way, about the middle of each handle."""
+        """Targets at a share of each handle's motion, interpolated about its center."""
         targets = []
         for handle in self.handles:
             motion = handle.target @ np.linalg.inv(handle.rest)
@@ -107,7 +107,7 @@ BODIES = {
 
 @cache
 def surface(name, data, vertices=VERTICES):
-    """About so many vertices, with their triangles."""
+    """(vertices, triangles) with about as many vertices as asked for."""
     if name in BODIES:
         source = BODIES[name]
     else:
@@ -118,7 +118,7 @@ def surface(name, data, vertices=VERTICES):
 
 
 def _pressed(shape, data, kind, seed):
-    """The top of a shape along a drawn direction goes into an obstacle, and its bottom is held."""
+    """A Case: the top of a shape along a random direction moves into an obstacle, its bottom is fixed."""
     rng = np.random.default_rng([seed, len(kind), len(shape)])
     points = surface(shape, data)[0]
     along = rng.normal(size=3) * [1, 1, 1.5]
@@ -133,7 +133,7 @@ def _pressed(shape, data, kind, seed):
     frame = np.eye(4)
     frame[:3, :3] = Rotation.random(random_state=rng).as_matrix()
     half = {"ball": [0.25] * 3, "box": [0.2, 0.25, 0.3], "edge": [0.3, 0.3, 0.3]}.get(kind, [0.4, 0.4, 0.008])
-    if kind != "ball":  # z looks against the way; of an edge two faces do
+    if kind != "ball":  # z is opposite to the motion; for an edge, two faces are
         z = -way
         x = np.cross(z, along) / np.linalg.norm(np.cross(z, along))
         basis = np.stack([x, np.cross(z, x), z], axis=1)
@@ -156,7 +156,7 @@ def _pressed(shape, data, kind, seed):
 
 
 def _boxed(along, low):
-    """(4, 4) cuboid of all points whose height along a direction is less than `low`."""
+    """(4, 4) cuboid that contains all points whose height along a direction is less than `low`."""
     a = np.cross(along, [0.3, 0.5, 0.8])
     a /= np.linalg.norm(a)
     matrix = np.eye(4)
@@ -170,7 +170,7 @@ def _ball(center, radius=0.07):
 
 
 def _posed(name, shape, parts, solids=(), itself=False):
-    """Parts: (center, radius, motion)."""
+    """A Case of handles `parts`: (center, radius, motion)."""
     handles = [moved(_ball(center, radius), motion) for center, radius, motion in parts]
     return Case(name, shape, handles, list(solids), itself)
 
@@ -181,7 +181,7 @@ def _block(low, high):
 
 
 def figures():
-    """Feet onto steps, sitting, arms, legs, tails, and bars on themselves."""
+    """Cases: feet on steps, sitting, arms, legs, tails, and bars on themselves."""
     still = np.eye(4)
     trunk, head = ((0, 0, 0.7), 0.16, still), ((0, 0, 1.1), 0.07, still)
     feet = [((side * 0.12, 0, 0.03), 0.08, still) for side in (-1, 1)]
@@ -218,7 +218,7 @@ def pressed_bar(kind):
 
 
 def family(data, seeds=(0, 1)):
-    """At least thirty cases; `data` is the folder with meshes/."""
+    """At least thirty Cases; `data`: the folder with meshes/."""
     shapes = ("spot", "bunny", "rockerArm")
     kinds = ("ball", "box", "edge", "plate", "sheet", "moving plate")
     cases = [_pressed(shape, data, kind, seed) for kind in kinds for shape in shapes for seed in seeds[:1]]
@@ -227,5 +227,5 @@ def family(data, seeds=(0, 1)):
 
 
 def deepest(case, points):
-    """In shares of the largest extent of the points at rest: how deep one is inside an obstacle."""
+    """Largest depth of a point in an obstacle, as a share of the largest extent at rest."""
     return max((0.0, *(float(-s.distance(points).min()) for s in case.solids)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fork: a tube along a U, whose legs are near in space but apart along the shape."""
+"""A fork: a tube along a U, whose legs are close in space but far apart along the surface."""
 
 import numpy as np
 from support.geometry.bar import box
@@ -13,7 +13,7 @@ TIP = box([BEND, 0, LEG], [0.2, 0.2, 0.2])
 
 
 def fork_samples(count=8000, seed=0):
-    """Samples with normals: legs of length LEG along z at x = ±BEND, a half circle below, round ends."""
+    """Samples with normals of legs of length LEG along z at x = ±BEND, a half circle below and round ends."""
     rng = np.random.default_rng(seed)
     arc, cap = np.pi * BEND, 2 * np.pi * RADIUS**2
     tube = 2 * np.pi * RADIUS * (2 * LEG + arc)

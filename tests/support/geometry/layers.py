@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small networks, without PyTorch: what a short process loads."""
+"""Small networks without PyTorch, for short processes."""
 
 from itertools import pairwise
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes that tests share: vertices (n,3) float64, triangles (m,3) int64, counter-clockwise from outside."""
+"""Meshes of tests: vertices (n, 3) float64, triangles (m, 3) int64, counter-clockwise from outside."""
 
 import functools
 import os
@@ -12,7 +12,7 @@ import numpy as np
 
 
 def grid_triangles(rows, columns, wrap_rows=False, wrap_columns=False):
-    """Two triangles a cell of a rows × columns grid of vertices; wrapping joins its borders."""
+    """Two triangles per cell of a rows × columns grid of vertices; wrapping joins opposite borders."""
     i, j = np.meshgrid(
         np.arange(rows if wrap_rows else rows - 1), np.arange(columns if wrap_columns else columns - 1)
     )
@@ -31,7 +31,7 @@ def torus(major=1.0, minor=0.4, around=48, tube=24):
 
 
 def sphere(radius=1.0, subdivisions=3):
-    """An octahedron, its triangles quartered and its vertices moved out to the sphere."""
+    """A subdivided octahedron with its vertices projected to the sphere."""
     vertices = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
     upper = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4]]
     triangles = np.array(upper + [[b, a, 5] for a, b, _ in upper])
@@ -41,7 +41,7 @@ def sphere(radius=1.0, subdivisions=3):
 
 
 def subdivide(vertices, triangles):
-    """Every triangle into four, through the middles of its edges; the surface stays as it is."""
+    """Splits each triangle into four at the midpoints of its edges, without changing the surface."""
     edges = np.sort(
         np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
     )
@@ -62,16 +62,16 @@ def box(half=(1.0, 1.0, 1.0)):
 
 
 def check_closed(V, F):
-    """A closed manifold, counter-clockwise seen from outside."""
+    """Asserts a closed manifold, counter-clockwise from outside."""
     edges = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]).astype(np.int64)
     forwards, backwards = edges @ [len(V), 1], edges @ [1, len(V)]
-    assert len(np.unique(forwards)) == len(forwards)  # no edge is run through twice the same way
-    assert np.array_equal(np.sort(forwards), np.sort(backwards))  # each once in either
+    assert len(np.unique(forwards)) == len(forwards)  # no directed edge occurs twice
+    assert np.array_equal(np.sort(forwards), np.sort(backwards))  # each edge occurs once in each direction
     assert np.einsum("ij,ij->i", V[F[:, 0]], np.cross(V[F[:, 1]], V[F[:, 2]])).sum() > 0
 
 
 def read(path):
-    """Vertices and triangles of an OBJ or OFF file; larger faces become fans."""
+    """Vertices and triangles of an OBJ or OFF file; polygons become triangle fans."""
     path = Path(path)
     lines = [line.split() for line in path.read_text().splitlines() if line.strip() and line[0] != "#"]
     if path.suffix == ".off":
@@ -89,8 +89,8 @@ def read(path):
 
 @functools.cache
 def suzanne():
-    """Blender's monkey: open at the eyes, and its parts run through each other. Needs the bpy package, or the
-    name of a file with it, ARAPFIELDS_SUZANNE, where there is none for the processor."""
+    """Blender's monkey: open at the eyes, with parts that intersect. Needs bpy, or a file with the mesh,
+    ARAPFIELDS_SUZANNE, on processors for which there is no bpy."""
     if "ARAPFIELDS_SUZANNE" in os.environ:
         return read_arrays(os.environ["ARAPFIELDS_SUZANNE"])
     code = (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two readers of how much of a surface passes through itself where it does not at rest."""
+"""Two measures of self-intersection that is not present at rest."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -27,7 +27,7 @@ def overlapping(rest, vertices, triangles):
 
 
 def crossing(rest, vertices, triangles):
-    """Share of the area of triangles that others cut which are no neighbours at rest; by edges alone."""
+    """Share of the area of triangles cut by edges of others that are not their neighbors at rest."""
     corners, before = vertices[triangles], rest[triangles].mean(1)
     middles = corners.mean(1)
     radius = np.linalg.norm(corners - middles[:, None], axis=2).max()

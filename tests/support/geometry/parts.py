@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures built from closed parts that cut each other, as game characters are."""
+"""Figures of closed, intersecting parts, as game characters are built."""
 
 import numpy as np
 
-LEG = 0.1  # off the middle
+LEG = 0.1  # distance of a leg from the middle
 
 
 def ellipsoid(center, radii, count):
-    """A closed surface, its triangles outwards."""
+    """A closed surface, oriented outwards."""
     u, v = np.meshgrid(
         np.linspace(0, np.pi, count + 1), 2 * np.pi * np.arange(2 * count) / (2 * count), indexing="ij"
     )
@@ -23,7 +23,7 @@ def ellipsoid(center, radii, count):
 
 
 def figure(count=24):
-    """(vertices, triangles, the part of each vertex): a head with a hollow, shoes that cut each other."""
+    """(vertices, triangles, part of each vertex): a head with a cavity, shoes that intersect."""
     hollow = ellipsoid((0, 0, 1.15), (0.33, 0.3, 0.27), count)
     parts = {
         "trunk": ellipsoid((0, 0, 0.7), (0.17, 0.12, 0.3), count),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes that are wrapped onto each other, and how far the results are from their targets."""
+"""Shapes to wrap onto each other, and errors of the results."""
 
 import numpy as np
 from support.geometry.meshes import sphere
@@ -10,7 +10,7 @@ SMALL = {"centers": 60, "stages": 3, "iterations": 10}
 
 
 def figure(subdivisions=4):
-    """(n, 3), (m, 3): a closed shape with a long nose and a hump, like no turn of itself."""
+    """(n, 3), (m, 3): a closed shape with a long nose and a hump, without rotational symmetry."""
     v, f = sphere(1.0, subdivisions)
     nose = 0.9 * np.exp(-8 * ((v - [1, 0, 0]) ** 2).sum(1, keepdims=True))
     hump = 0.5 * np.exp(-6 * ((v - [0, 0.6, 0.8]) ** 2).sum(1, keepdims=True))
@@ -18,7 +18,7 @@ def figure(subdivisions=4):
 
 
 def star():
-    """(n, 3), (m, 3), (8,): a ball with five unlike arms; vertices at their ends and beside three of them."""
+    """(n, 3), (m, 3), (8,): a ball with five different arms; vertices at their ends and beside three."""
     v, f = sphere(1.0, 4)
     arms = np.array([[1, 0, 0], [-0.8, 0.6, 0.1], [0.1, -0.9, 0.4], [-0.3, 0.2, -0.9], [0.2, 0.8, 0.6]])
     arms /= np.linalg.norm(arms, axis=1)[:, None]
@@ -30,8 +30,8 @@ def star():
 
 
 def tailed(curl, rings=80, around=16):
-    """(n, 3), (m, 3), (8,): a body with two humps whose thin tail bends by this angle; vertices at its nose,
-    the tail's tip and six places between."""
+    """(n, 3), (m, 3), (8,): a body with two humps and a thin tail bent by `curl`; vertices at its nose, the
+    tail's tip and six points between."""
     along = np.linspace(0, 1, rings)
     turn = curl * np.clip((along - 0.62) / 0.38, 0, 1)
     ahead = np.stack([np.cos(turn), np.zeros(rings), np.sin(turn)], 1)
@@ -60,7 +60,7 @@ def tailed(curl, rings=80, around=16):
 
 
 def doll(head, body):
-    """A ball with a nose on another one with feet, of these radii; it looks along -y."""
+    """A ball with a nose on a ball with feet, of these radii; it faces -y."""
     balls = [(body, (0, 0, 0)), (head, (0, 0, 0.8)), (0.12, (0, -head, 0.8))]
     balls += [(0.15, (side, -0.1, -0.45)) for side in (-0.25, 0.25)]
     v, f = sphere(1.0, 3)
@@ -76,7 +76,7 @@ def rotation(axis, angle):
 
 
 def bend(points, rate=0.25):
-    """A known field: bends space about the z axis, more the farther out along x."""
+    """A known field that bends space about the z axis, increasingly along x."""
     angle = rate * points[:, 0]
     c, s = np.cos(angle), np.sin(angle)
     x, y, z = points.T
@@ -88,7 +88,7 @@ def moved(points, scale=3.0, angle=2.0):
 
 
 def distances(vertices, triangles, onto_vertices, onto_triangles, count=5000):
-    """((mean, 95 %) to the target, (mean, 95 %) from it), exact, in % of the target's diagonal."""
+    """((mean, 95th percentile) to the target, the same from it), exact, in % of the target's diagonal."""
     diagonal = np.linalg.norm(np.ptp(onto_vertices, axis=0))
     pairs = []
     for mesh, other in (
@@ -102,7 +102,7 @@ def distances(vertices, triangles, onto_vertices, onto_triangles, count=5000):
 
 
 def crossing_share(vertices, triangles):
-    """Share of the triangles that pass through another one with which they share no vertex."""
+    """Share of the triangles that intersect another one without a common vertex."""
     from scipy.spatial import cKDTree
 
     corners = vertices[triangles]
@@ -122,7 +122,7 @@ def crossing_share(vertices, triangles):
 
 
 def pierced(triangles, start, end):
-    """Whether the ways from start to end, (n, 3) each, go through the triangles (n, 3, 3)."""
+    """Whether the segments from start to end, (n, 3) each, intersect the triangles (n, 3, 3)."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     normal = np.cross(b - a, c - a)
     before, after = ((start - a) * normal).sum(1), ((end - a) * normal).sum(1)

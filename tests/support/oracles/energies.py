@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The energies written the slow, obvious way in PyTorch (float64), derivatives by autograd."""
+"""Reference implementation of the energies in PyTorch (float64), with derivatives by autograd."""
 
 import numpy as np
 import torch
@@ -32,7 +32,7 @@ def jacobians_of(jets):
 
 
 def polar(jacobians):
-    """Closest rotations (det +1) by singular values."""
+    """Closest rotations (det +1) by singular value decomposition."""
     u, _, vh = torch.linalg.svd(jacobians)
     sign = torch.det(u @ vh).detach()
     u = torch.cat([u[..., :2], u[..., 2:] * sign[..., None, None]], -1)
@@ -61,7 +61,7 @@ def gauss_loss(jets, normals, preferred, weights, sharpness, sample_weights=None
 
 
 def gradient_of(function, jets):
-    """Value(s) and the gradient of the first by the jets."""
+    """Value(s), and the gradient of the first by the jets."""
     leaf = torch.tensor(jets, requires_grad=True)
     value = function(leaf)
     value.backward()

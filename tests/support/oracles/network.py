@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The network in plain PyTorch, double precision, differentiated by PyTorch: slow and obviously right."""
+"""Reference implementation of the network in PyTorch, double precision, with derivatives by autograd."""
 
 import numpy as np
 import torch
@@ -19,7 +19,7 @@ class Network:
 
     @property
     def layers(self):
-        """Weights, biases, octaves, frequency, sharpness as the package's functions take them."""
+        """Weights, biases, octaves, frequency and sharpness as arguments of the package's functions."""
         arrays = [[t.detach().numpy() for t in group] for group in (self.weights, self.biases)]
         return *arrays, self.octaves, self.frequency, self.sharpness
 

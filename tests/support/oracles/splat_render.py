@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An independent renderer of Gaussian splats (Zwicker et al. 2001, Kerbl et al. 2023), in NumPy alone."""
+"""An independent renderer of Gaussian splats (Zwicker et al. 2001, Kerbl et al. 2023) in NumPy."""
 
 import math
 
@@ -47,7 +47,7 @@ def harmonics(directions, count):
 
 
 def render(splats, camera, pixels=64, focal=1.6):
-    """(pixels, pixels, 3) as seen by a camera: (4, 4) world → camera, looking along its −z."""
+    """(pixels, pixels, 3) picture by a camera, (4, 4) world → camera, that looks along its −z."""
     turn, shift = camera[:3, :3], camera[:3, 3]
     centers = np.asarray(splats.centers, float)
     eye = -turn.T @ shift

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the tests of batches share: folders of inputs, and a stand-in for Blender.
+"""Helpers of tests of batches: folders of inputs, and a stand-in for Blender.
 
-python tests/support/programs/batches.py FLAGS is a batch of that stand-in.
+python tests/support/programs/batches.py FLAGS runs a batch with the stand-in.
 """
 
 import os
@@ -29,7 +29,7 @@ def batch(folders, *further, output="out"):
 
 
 class FakeLaunch:
-    """Instead of Blender a Python one-liner that writes the output; it fails, or dies, by the file's name."""
+    """Runs a short Python program instead of Blender: it writes, fails or crashes by the file's name."""
 
     code = """
 import json, os, sys
@@ -54,7 +54,7 @@ sys.exit(0 if good else 1)
 
 
 def statuses(folder):
-    """Input → status, of all that is noted."""
+    """{input: status} of the record."""
     record = Record(folder)
     names = [
         path.relative_to(folder / FOLDER).as_posix()[:-5] for path in (folder / FOLDER).rglob("*.*.json")
@@ -63,7 +63,7 @@ def statuses(folder):
 
 
 def starts(folder):
-    """Names of the inputs, as often as a Blender was started for them."""
+    """Names of the inputs, once per start of a Blender."""
     return sorted((folder / "starts").read_text().split())
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the tests of the command line share: running it, and files that it must refuse."""
+"""Helpers of tests of the command line: runs it; files that it must refuse."""
 
 import os
 import sys
@@ -39,12 +39,12 @@ TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
 
 def run(*arguments):
-    """The exit code of the command line."""
+    """Runs the command line in this process; returns its exit code."""
     return main([str(argument) for argument in arguments])
 
 
 def process(*arguments):
-    """Command and environment of the command line as a process of its own, in any folder."""
+    """Arguments of subprocess functions that run the command line, in any folder."""
     places = [str(Path(arapfields.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
     command = [sys.executable, "-m", "arapfields", *(str(argument) for argument in arguments)]
     return command, {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, places))}
@@ -56,8 +56,8 @@ def wait_until(process, is_done):
 
 
 def wait_until_loaded(running):
-    """Sleeps until a process has begun to load the library."""
-    maps = Path(f"/proc/{running.pid}/maps")  # Linux alone has it
+    """Waits until a process has begun to load the library."""
+    maps = Path(f"/proc/{running.pid}/maps")  # only on Linux
     if maps.exists():
         wait_until(running, lambda: "_native" in maps.read_text())
     else:
@@ -65,7 +65,7 @@ def wait_until_loaded(running):
 
 
 def wait_until_at_work(running):
-    """Sleeps until a process has loaded the library and worked on for a while, on however busy a machine."""
+    """Waits until a process has loaded the library and used some processor time since."""
     wait_until_loaded(running)
     stat = Path(f"/proc/{running.pid}/stat")
     if not stat.exists():
@@ -81,7 +81,7 @@ def wait_until_at_work(running):
 
 
 def write_octahedron(path, quads=False):
-    """An octahedron as OBJ, or a cube of quads."""
+    """Writes an octahedron as OBJ, or a cube of quads."""
     if quads:
         corners = [(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
         faces = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (3, 7, 8, 4), (1, 5, 7, 3), (2, 4, 8, 6)]
@@ -94,7 +94,7 @@ def write_octahedron(path, quads=False):
 
 
 def bad_meshes(folder, mesh_file):
-    """Paths that are no usable mesh, by what is wrong; truncations are of the real file `mesh_file`."""
+    """{defect: path} of unusable mesh files; truncated ones are parts of `mesh_file`."""
     whole = Path(mesh_file).read_bytes()
     header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
     contents = {
@@ -115,7 +115,7 @@ def bad_meshes(folder, mesh_file):
         "garbage.ply": bytes(range(256)) * 3,
         "lines.obj": "v 0\nv 1\nv 2\nf 1 2 3\n",
         "short_row.obj": TRIANGLE + "v 1\nf 1 2 4\n",
-        "no_columns.obj": b"v -\xe6\x0b\x1e\xe9\nf 1 1 1",  # one vertex of no numbers, as trimesh reads it
+        "no_columns.obj": b"v -\xe6\x0b\x1e\xe9\nf 1 1 1",  # trimesh reads one vertex without coordinates
         "flat.obj": "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n",
         "mesh.fbx": TRIANGLE + "f 1 2 3\n",
         "extensionless": TRIANGLE + "f 1 2 3\n",

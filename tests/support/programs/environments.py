@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands and Python environments that find nothing by chance."""
+"""Commands and Python environments isolated from this environment."""
 
 import os
 import subprocess
@@ -9,7 +9,7 @@ LEFT_OUT = ("CMAKE_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "PYTHONPYCACHE
 
 
 def run(*command, code=0, **keywords):
-    """What a command prints; it must end with `code`. stderr=subprocess.STDOUT adds its errors."""
+    """The output of a command, which must end with `code`; stderr=subprocess.STDOUT includes its errors."""
     environment = {key: value for key, value in os.environ.items() if key not in LEFT_OUT}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     command = [str(part) for part in command]
@@ -19,7 +19,7 @@ def run(*command, code=0, **keywords):
 
 
 def fresh(folder, *wanted):
-    """The Python of a new environment below `folder`, in which pip was asked for `wanted`."""
+    """The Python of a new virtual environment in `folder` with the packages `wanted`."""
     run(sys.executable, "-m", "venv", folder / "venv")
     python = folder / "venv" / "bin" / "python"
     run(python, "-m", "pip", "install", "-q", "--disable-pip-version-check", *wanted)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The build that the tests run on, and what CMake installs of it."""
+"""The tested build, and its files installed by CMake."""
 
 import os
 import re

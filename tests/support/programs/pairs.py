@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every bound class with its methods as calls, and what they answer from several threads at once."""
+"""Calls of all bound classes' methods, and their results from several threads."""
 
 import itertools
 import threading
@@ -68,7 +68,7 @@ def assign(name, value):
 
 
 def changes_under_way(name, calls):
-    """Whether one reads what another shows while it works: a task's progress."""
+    """Whether a call reads a value that another one changes while it runs: a task's progress."""
     return name == "Task" and bool({"serve", "deform"} & set(calls))
 
 
@@ -82,7 +82,7 @@ FIELD = {
 }
 DISTANCE = {"__call__": lambda it: it(POINTS), "gradient": lambda it: it.gradient(POINTS)}
 
-# A class: how to make an object, and calls beside reading its properties.
+# {class: (function that makes an object, {name: call}, without reads of properties)}
 CLASSES = {
     "LiveDeformer": (
         live,
@@ -169,11 +169,11 @@ CLASSES = {
         {"__call__": lambda it: it(POINTS[:, :2]), "jacobian": lambda it: it.jacobian(POINTS[:, :2])},
     ),
 }
-STATIC = {"load", "from_layers", "preset", "save", "fields", "is_file"}  # and what other tests do with files
+STATIC = {"load", "from_layers", "preset", "save", "fields", "is_file"}  # and files, which other tests cover
 
 
 def calls_of(name):
-    """The class's calls, with those that read its properties."""
+    """The calls of a class, including reads of its properties."""
     make, calls = CLASSES[name]
     kind = getattr(_native, name)
     readers = {
@@ -185,7 +185,7 @@ def calls_of(name):
 
 
 def told(answer):
-    """What can be compared: bits of arrays and of what fields do, numbers of reports but times."""
+    """A comparable form of a result: bits of arrays and fields, numbers of reports except times."""
     if isinstance(answer, np.ndarray):
         return answer.shape, answer.tobytes()
     if isinstance(answer, af.DeformationField):
@@ -209,14 +209,14 @@ def asked(call, it):
 
 
 def in_order(make, calls, order):
-    """Each call's answer, in the calls' own order, when they come in this one."""
+    """The results of calls executed in `order`, listed in the order of `calls`."""
     it = make()
     answers = {place: asked(calls[place], it) for place in order}
     return tuple(answers[place] for place in range(len(calls)))
 
 
 def at_once(make, calls):
-    """The same from a thread each."""
+    """The same with each call on a separate thread."""
     it, answers = make(), [None] * len(calls)
     begin = threading.Barrier(len(calls))
 
@@ -234,5 +234,5 @@ def at_once(make, calls):
 
 
 def possible(make, calls):
-    """The answers of all orders."""
+    """The results of all orders."""
     return {in_order(make, calls, order) for order in itertools.permutations(range(len(calls)))}
