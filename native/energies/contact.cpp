@@ -22,20 +22,21 @@ double contact_energy(const std::vector<ContactPlane>& planes, double stiffness,
                       Scalar* cotangents) {
   double energy = 0.0;
   for (const ContactPlane& plane : planes) {
-    if (plane.grip > 0.0) {
+    if (plane.friction > 0.0) {
       const Vec3 slip = plane.slip(places);
-      const double way = slip.norm(), sliding = std::max(way, stuck);
-      energy += plane.share * plane.grip * (way < stuck ? 0.5 * way * way / stuck : way - 0.5 * stuck);
+      const double length = slip.norm(), sliding = std::max(length, stuck);
+      energy += plane.area * plane.friction *
+                (length < stuck ? 0.5 * length * length / stuck : length - 0.5 * stuck);
       if (cotangents != nullptr)
         for (int k = 0; k < 3; ++k)
           cotangents[3 * plane.first + k] +=
-              static_cast<Scalar>(plane.share * plane.grip * slip[k] / sliding);
+              static_cast<Scalar>(plane.area * plane.friction * slip[k] / sliding);
     }
-    const double pressed = plane.pressed(plane.gap(places), stiffness);
-    energy += plane.share * (pressed * pressed - plane.pressure * plane.pressure) / (2.0 * stiffness);
+    const double pressed = plane.updated_pressure(plane.gap(places), stiffness);
+    energy += plane.area * (pressed * pressed - plane.pressure * plane.pressure) / (2.0 * stiffness);
     if (cotangents == nullptr || pressed == 0.0) continue;
     for (int k = 0; k < 3; ++k) {
-      const auto force = static_cast<Scalar>(plane.share * pressed * plane.normal[k]);
+      const auto force = static_cast<Scalar>(plane.area * pressed * plane.normal[k]);
       cotangents[3 * plane.first + k] -= force;
       if (plane.second >= 0) cotangents[3 * plane.second + k] += force;
     }
@@ -45,26 +46,26 @@ double contact_energy(const std::vector<ContactPlane>& planes, double stiffness,
 
 template <class Scalar>
 double contact_step(const std::vector<ContactPlane>& planes, double stiffness, const Scalar* places,
-                    const Scalar* ways, double slope) {
+                    const Scalar* displacements, double slope) {
   struct Meeting {
     double pressed;  // pressure − stiffness·gap
     double rate;     // its derivative along the step
-    double share;
+    double area;
   };
   std::vector<Meeting> meetings;
   for (const ContactPlane& plane : planes) {
-    if (plane.grip > 0.0) return 1.0;
+    if (plane.friction > 0.0) return 1.0;
     const double pressed = plane.pressure - stiffness * plane.gap(places);
-    const double rate = -stiffness * (plane.gap(ways) + plane.offset);
-    if (pressed > 0.0 || pressed + rate > 0.0) meetings.push_back({pressed, rate, plane.share});
+    const double rate = -stiffness * (plane.gap(displacements) + plane.offset);
+    if (pressed > 0.0 || pressed + rate > 0.0) meetings.push_back({pressed, rate, plane.area});
   }
   const auto at = [&](double t) {  // first and second derivative of the planes' energy at t
     double first = 0.0, second = 0.0;
     for (const Meeting& m : meetings) {
       const double pressed = m.pressed + t * m.rate;
       if (pressed <= 0.0) continue;
-      first += m.share * pressed * m.rate / stiffness;
-      second += m.share * m.rate * m.rate / stiffness;
+      first += m.area * pressed * m.rate / stiffness;
+      second += m.area * m.rate * m.rate / stiffness;
     }
     return std::pair(first, second);
   };

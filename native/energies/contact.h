@@ -15,11 +15,11 @@ struct ContactPlane {
   Vec3 normal;        ///< unit length, to the feasible side
   double offset = 0.0;
   double pressure = 0.0;       ///< Lagrange multiplier per unit of area, ≥ 0
-  double share = 0.0;          ///< area weight: fraction of the surface's area
+  double area = 0.0;           ///< area weight: fraction of the surface's area
   Index obstacle = 0;          ///< index of the surface: an obstacle, a ground, or the shape itself
-  double start = 0.0;          ///< the gap at the search that made the plane
+  double initial_gap = 0.0;    ///< the gap at the search that made the plane
   Vec3 anchor = Vec3::Zero();  ///< position of the point under static friction
-  double grip = 0.0;           ///< friction coefficient times pressure; 0: frictionless
+  double friction = 0.0;       ///< coefficient times pressure; 0: frictionless
 
   /// Tangential displacement from the anchor.
   template <class Scalar>
@@ -41,7 +41,7 @@ struct ContactPlane {
     return result;
   }
   /// The updated multiplier max(0, pressure − stiffness·gap), which is also the contact force per area.
-  double pressed(double gap, double stiffness) const {
+  double updated_pressure(double gap, double stiffness) const {
     return pressure > stiffness * gap ? pressure - stiffness * gap : 0.0;
   }
 };
@@ -49,19 +49,20 @@ struct ContactPlane {
 /// Tangential displacement, in cube units, below which friction is quadratic (static) instead of linear.
 constexpr double stuck = 2e-4;
 
-/// The augmented Lagrangian Σ share (max(0, pressure − stiffness·gap)² − pressure²)/(2 stiffness) of the
-/// planes, and friction Σ share·grip·|slip|, smoothed below `stuck` (Li et al. 2020, Incremental potential
+/// The augmented Lagrangian Σ area (max(0, pressure − stiffness·gap)² − pressure²)/(2 stiffness) of the
+/// planes, and friction Σ area·friction·|slip|, smoothed below `stuck` (Li et al. 2020, Incremental potential
 /// contact), at places (n,3) of the surface; adds its cotangents (n,3) (null: the value alone).
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double contact_energy(const std::vector<ContactPlane>& planes, double stiffness,
                                                  const Scalar* places, Scalar* cotangents);
 
-/// First trial step length of a line search from places (n,3) along displacements `ways` (n,3), at most 1:
+/// First trial step length of a line search from places (n,3) along `displacements` (n,3), at most 1:
 /// the minimiser of the planes' energy, whose second derivative jumps where a plane becomes active, plus a
 /// quadratic model of all other terms. `slope` < 0 is the directional derivative of the total; the quadratic
 /// is such that without changes of the active set the minimiser is 1. Returns 1 with friction.
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double contact_step(const std::vector<ContactPlane>& planes, double stiffness,
-                                               const Scalar* places, const Scalar* ways, double slope);
+                                               const Scalar* places, const Scalar* displacements,
+                                               double slope);
 
 }  // namespace arapfields

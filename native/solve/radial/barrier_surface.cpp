@@ -184,7 +184,7 @@ std::vector<BarrierSurface::Hit> BarrierSurface::first_hits(PointsIn from, Point
   for (std::size_t k = 0; k < met_rows.size(); ++k) {
     const Index i = met_rows[k], row = static_cast<Index>(k);
     Hit& hit = hits[static_cast<std::size_t>(i)];
-    hit.share = share[i];
+    hit.parameter = share[i];
     hit.normal = there.normals.row(row).transpose();
     hit.place = places.row(row).transpose() - there.distances[row] * hit.normal;
     if (sheet_ && hit.normal.dot(from.row(i).transpose() - hit.place) < 0.0) hit.normal = -hit.normal;

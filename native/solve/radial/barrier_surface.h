@@ -23,17 +23,17 @@ class BarrierSurface {
   /// Interpolates two placements at the parameter `share` in [0, 1].
   void place_between(const Mat4& from, const Mat4& to, double share);
   /// Whether both have the same function, whatever their placements.
-  bool is_alike(const BarrierSurface& other) const { return function_ == other.function_; }
+  bool has_same_function(const BarrierSurface& other) const { return function_ == other.function_; }
   Vector distances(PointsIn points) const;
   Nearest nearest(PointsIn points) const;
   /// Whether it is a sheet without an inside: its distances are unsigned, its normals point to the near side.
   bool is_sheet() const { return sheet_; }
   /// Whether it is the ground plane.
-  bool is_flat() const { return function_ == nullptr; }
+  bool is_ground() const { return function_ == nullptr; }
   double margin() const { return margin_; }
 
   struct Hit {
-    double share = 2.0;  ///< parameter along the segment; above 1: no hit
+    double parameter = 2.0;  ///< along the segment; above 1: no hit
     Vec3 place;
     Vec3 normal;  ///< unit, towards the segment's start
   };

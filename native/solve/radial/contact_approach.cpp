@@ -52,14 +52,14 @@ void ContactApproach::find_and_push(int pushes, double from) {
   s.objective(s.fast);
   for (int push = 0; push < pushes && depth > deep && depth < from; ++push) {
     const RowMatrix<double> before = s.shape.coefficients;
-    const ContactWays ways = s.contact.ways();
+    const ContactSides sides = s.contact.sides();
     push_out(s);
     const double next = s.contact.find(s.shape.coefficients);
     const bool worse = next >= depth;
     if (worse) {
       s.shape.coefficients = before;
       ++s.shape.revision;
-      s.contact.set_ways(ways);
+      s.contact.set_sides(sides);
       s.contact.find(s.shape.coefficients);
     }
     s.objective(s.fast);
@@ -75,15 +75,15 @@ bool ContactApproach::solve_round(const RowMatrix<double>& before, Index iterati
   stiffen_contact(s);
   const double allowed = std::max(too_deep, s.contact.deepest());
   const bool converged = s.descend(s.fast, {iterations, tolerance_, floor}, progress_).converged;
-  press_balanced(s);
-  const ContactWays ways = s.contact.ways();
+  update_balanced_pressures(s);
+  const ContactSides sides = s.contact.sides();
   double depth = s.contact.find(s.shape.coefficients, std::nullopt);
   bool back = false;
   for (int half = 0; half < most_halves && depth > allowed; ++half) {
     back = true;
     s.shape.coefficients = 0.5 * (s.shape.coefficients + before);
     ++s.shape.revision;
-    s.contact.set_ways(ways);
+    s.contact.set_sides(sides);
     depth = s.contact.find(s.shape.coefficients);
   }
   return converged && !back;
@@ -91,8 +91,8 @@ bool ContactApproach::solve_round(const RowMatrix<double>& before, Index iterati
 
 void ContactApproach::sweep(const std::vector<Mat4>& motions) {
   RadialState& s = state_;
-  if (s.contact.obstacle_way() == 0.0) return;
-  const auto wanted = static_cast<Index>(std::ceil(s.contact.obstacle_way() / obstacle_step));
+  if (s.contact.longest_obstacle_motion() == 0.0) return;
+  const auto wanted = static_cast<Index>(std::ceil(s.contact.longest_obstacle_motion() / obstacle_step));
   const Index steps = std::clamp<Index>(wanted, 1, usual.most_steps);
   const Index at_once = goes_to_its_end() ? steps_to_the_end : usual.iterations;
   swept_ = steps > 1;
@@ -100,15 +100,15 @@ void ContactApproach::sweep(const std::vector<Mat4>& motions) {
   for (Index k = 1; k <= steps; ++k) {
     s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(steps), true);
     find_and_push(1, too_deep);
-    if (k == steps || !s.contact.presses()) continue;
+    if (k == steps || !s.contact.has_planes()) continue;
     s.objective(s.fast);
     set_reachable_targets(s, motions);
     solve_round(RowMatrix<double>(s.shape.coefficients), at_once);
   }
 }
 
-void ContactApproach::approach(const std::vector<Mat4>& motions, double way, const Pace& pace) {
-  const auto steps = static_cast<Index>(std::ceil(way / length(pace)));
+void ContactApproach::approach(const std::vector<Mat4>& motions, double distance, const Pace& pace) {
+  const auto steps = static_cast<Index>(std::ceil(distance / length(pace)));
   approach_by(motions, std::clamp<Index>(steps, 1, pace.most_steps), pace.iterations);
 }
 
@@ -156,7 +156,7 @@ void ContactApproach::solve_to_targets(const std::vector<Mat4>& motions, bool to
     const double depth = s.contact.deepest();
     const bool rests = !to_its_end || (sample_places(s) - places).rowwise().norm().maxCoeff() < at_rest;
     if (converged && depth < deep && rests) return;
-    s.contact.harden(depth > deep && depth < nearly && depth > still_comes_out * last);
+    s.contact.adapt_stiffness(depth > deep && depth < nearly && depth > still_comes_out * last);
     last = depth;
     if (left <= 0 && (depth < deep || extra-- == 0)) return;
     if (left <= 0 && s.contact.deepest_outside() < deep && depth > still_comes_out * least) return;

@@ -31,8 +31,8 @@ class ContactApproach {
   /// Moves the obstacles from their last placements to the current ones, and the surface out of their way.
   /// The handles stay at `motions`.
   void sweep(const std::vector<Mat4>& motions);
-  /// Moves the handles from `motions` to their targets; `way` is the longest distance, in cube units.
-  void approach(const std::vector<Mat4>& motions, double way, const Pace& pace);
+  /// Moves the handles from `motions` to their targets; `distance` is the longest way, in cube units.
+  void approach(const std::vector<Mat4>& motions, double distance, const Pace& pace);
   /// The same in one step.
   void approach_at_once(const std::vector<Mat4>& motions) { approach_by(motions, 1, 0); }
   double length(const Pace& pace) const { return state_.contact.itself() ? pace.length_itself : pace.length; }

@@ -6,7 +6,7 @@
 
 #include "core/point_grid.h"
 #include "sampling/sample_choice.h"
-#include "solve/radial/contact_ways.h"
+#include "solve/radial/contact_sides.h"
 
 namespace arapfields {
 namespace {
@@ -43,13 +43,13 @@ class SamplesBeside {
   static std::vector<Index> nearer(const Vector& distances, double reach);
   bool is_inside(Index row) const { return distances_[row] < 0.0; }
   bool are_opposite(Index row, Index other) const {
-    return ways_out_.row(row).dot(ways_out_.row(other)) <= opposite;
+    return normals_.row(row).dot(normals_.row(other)) <= opposite;
   }
   template <class Take>
   void each_neighbour(Index row, Take&& take) const;
-  void leave(Index row) { left_[static_cast<std::size_t>(row)] = true; }
-  void leave_part(Index row);
-  void leave_between(const std::vector<Index>& from, const std::vector<Index>& to);
+  void mark(Index row) { marked_[static_cast<std::size_t>(row)] = true; }
+  void mark_patch(Index row);
+  void mark_between(const std::vector<Index>& from, const std::vector<Index>& to);
 
   const BarrierSurface& obstacle_;
   const ContactPoints& points_;
@@ -58,11 +58,11 @@ class SamplesBeside {
   Points places_;
   Points rest_;
   Vector distances_;
-  Points ways_out_;
+  Points normals_;
   PointGrid grid_;  // of the rest positions
   std::vector<Index> cells_;
-  std::vector<bool> left_;  // the result of crossed()
-  std::vector<bool> seen_;  // rows of patches that were visited
+  std::vector<bool> marked_;   // the result of crossed()
+  std::vector<bool> visited_;  // rows of patches that were visited
 };
 
 std::vector<Index> SamplesBeside::nearer(const Vector& distances, double reach) {
@@ -81,11 +81,11 @@ SamplesBeside::SamplesBeside(const BarrierSurface& obstacle, const ContactPoints
       places_(rows_of(places, samples_)),
       rest_(points.rest(samples_)),
       distances_(entries_of(distances, samples_)),
-      ways_out_(obstacle.nearest(places_).normals),
+      normals_(obstacle.nearest(places_).normals),
       grid_(rest_, reach_),
       cells_(grid_.cell_of_each()),
-      left_(samples_.size()),
-      seen_(samples_.size()) {}
+      marked_(samples_.size()),
+      visited_(samples_.size()) {}
 
 /// Calls take(other) for the neighbours of a row at rest.
 template <class Take>
@@ -98,31 +98,31 @@ void SamplesBeside::each_neighbour(Index row, Take&& take) const {
 
 /// Marks the connected patch of inside samples around a row, and its outside neighbours, unless the patch can
 /// be pushed out as a whole.
-void SamplesBeside::leave_part(Index row) {
+void SamplesBeside::mark_patch(Index row) {
   std::vector<Index> part{row}, samples, edge;
-  seen_[static_cast<std::size_t>(row)] = true;
+  visited_[static_cast<std::size_t>(row)] = true;
   for (std::size_t next = 0; next < part.size(); ++next) {
     samples.push_back(samples_[static_cast<std::size_t>(part[next])]);
     each_neighbour(part[next], [&](Index other) {
-      if (seen_[static_cast<std::size_t>(other)]) return;
+      if (visited_[static_cast<std::size_t>(other)]) return;
       if (!is_inside(other)) return edge.push_back(other);
-      seen_[static_cast<std::size_t>(other)] = true;
+      visited_[static_cast<std::size_t>(other)] = true;
       part.push_back(other);
     });
   }
-  if (comes_out(rows_of(ways_out_, part), points_.normals(samples))) return;
+  if (comes_out(rows_of(normals_, part), points_.normals(samples))) return;
   for (const std::vector<Index>* rows : {&part, &edge})
-    for (const Index each : *rows) leave(each);
+    for (const Index each : *rows) mark(each);
 }
 
 /// Marks pairs of rows (from_k, to_k) with the obstacle in between.
-void SamplesBeside::leave_between(const std::vector<Index>& from, const std::vector<Index>& to) {
+void SamplesBeside::mark_between(const std::vector<Index>& from, const std::vector<Index>& to) {
   const std::vector<BarrierSurface::Hit> hits =
       obstacle_.first_hits(rows_of(places_, from), rows_of(places_, to));
   for (std::size_t k = 0; k < hits.size(); ++k) {
-    if (hits[k].share > 1.0) continue;
-    leave(from[k]);
-    leave(to[k]);
+    if (hits[k].parameter > 1.0) continue;
+    mark(from[k]);
+    mark(to[k]);
   }
 }
 
@@ -132,60 +132,60 @@ std::vector<Index> SamplesBeside::crossed() {
   for (Index row = 0; row < count; ++row)
     each_neighbour(row, [&](Index other) {
       if (!are_opposite(row, other)) return;
-      if (is_inside(row) && !seen_[static_cast<std::size_t>(row)]) leave_part(row);
+      if (is_inside(row) && !visited_[static_cast<std::size_t>(row)]) mark_patch(row);
       if (is_inside(row) || is_inside(other) || row > other) return;
       from.push_back(row);
       to.push_back(other);
     });
-  leave_between(from, to);
+  mark_between(from, to);
   std::vector<Index> result;
   for (Index row = 0; row < count; ++row)
-    if (left_[static_cast<std::size_t>(row)]) result.push_back(samples_[static_cast<std::size_t>(row)]);
+    if (marked_[static_cast<std::size_t>(row)]) result.push_back(samples_[static_cast<std::size_t>(row)]);
   return result;
 }
 
 }  // namespace
 
-void ContactWays::cross(Index surface, const BarrierSurface& obstacle, const ContactPoints& points,
-                        PointsIn places) {
+void ContactSides::find_crossings(Index surface, const BarrierSurface& obstacle, const ContactPoints& points,
+                                  PointsIn places) {
   std::vector<bool>& samples = crossed[static_cast<std::size_t>(surface)];
   samples.clear();
-  if (obstacle.is_flat() || obstacle.is_sheet()) return;
+  if (obstacle.is_ground() || obstacle.is_sheet()) return;
   const Index count = points.sample_count();
-  const Vector distances = clear.col(surface).head(count);
+  const Vector distances = clearance.col(surface).head(count);
   const std::vector<Index> rows = SamplesBeside(obstacle, points, places.topRows(count), distances).crossed();
   if (rows.empty()) return;
   samples.assign(static_cast<std::size_t>(count), false);
   for (const Index row : rows) {
     samples[static_cast<std::size_t>(row)] = true;
-    if (clear(row, surface) < 0.0) clear(row, surface) = left_inside;
+    if (clearance(row, surface) < 0.0) clearance(row, surface) = left_inside;
   }
-  for (Index row = count; row < clear.rows(); ++row)
-    if (clear(row, surface) < 0.0 && crosses(surface, points.sample_of(row)))
-      clear(row, surface) = left_inside;
+  for (Index row = count; row < clearance.rows(); ++row)
+    if (clearance(row, surface) < 0.0 && crosses(surface, points.sample_of(row)))
+      clearance(row, surface) = left_inside;
 }
 
-std::vector<Index> ContactWays::crossing() const {
+std::vector<Index> ContactSides::crossing_surfaces() const {
   std::vector<Index> surfaces;
   for (Index k = 0; k < std::ssize(crossed); ++k)
-    if (!crossed[static_cast<std::size_t>(k)].empty() && (clear.col(k).array() == left_inside).any())
+    if (!crossed[static_cast<std::size_t>(k)].empty() && (clearance.col(k).array() == left_inside).any())
       surfaces.push_back(k);
   return surfaces;
 }
 
-void ContactWays::begin_beside_crossings(Index surface, const BarrierSurface& obstacle,
-                                         const std::vector<Index>& samples, PointsIn places) {
+void ContactSides::begin_beside_crossings(Index surface, const BarrierSurface& obstacle,
+                                          const std::vector<Index>& samples, PointsIn places) {
   std::vector<Index> rows;
-  const Index first = clear.rows() - std::ssize(samples);
-  for (Index row = first; row < std::min(clear.rows(), places.rows()); ++row)
+  const Index first = clearance.rows() - std::ssize(samples);
+  for (Index row = first; row < std::min(clearance.rows(), places.rows()); ++row)
     if (crosses(surface, samples[static_cast<std::size_t>(row - first)])) rows.push_back(row);
   if (rows.empty()) return;
   const Points begun = rows_of(places, rows);
   const Vector distances = obstacle.distances(begun);
   for (Index i = 0; i < distances.size(); ++i) {
     const Index row = rows[static_cast<std::size_t>(i)];
-    clear(row, surface) = distances[i] < 0.0 ? left_inside : distances[i];
-    seen[static_cast<std::size_t>(surface)].row(row) = begun.row(i);
+    clearance(row, surface) = distances[i] < 0.0 ? left_inside : distances[i];
+    outside[static_cast<std::size_t>(surface)].row(row) = begun.row(i);
   }
 }
 

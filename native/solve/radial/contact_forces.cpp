@@ -62,23 +62,23 @@ Points contact_places(RadialState& s) {
 }
 
 void stiffen_contact(RadialState& s) {
-  if (!s.contact.presses()) return;
+  if (!s.contact.has_planes()) return;
   s.fast.objective.latest()->set_contact_stiffness(
       {s.problem.basis, s.contact.found(), contact_places(s), s.preconditioner.inverse_factor.latest()});
 }
 
 bool would_press(RadialState& s) {
-  if (!s.contact.presses()) return false;
+  if (!s.contact.has_planes()) return false;
   const Points places = contact_places(s);
   return std::any_of(s.contact.found().planes.begin(), s.contact.found().planes.end(),
                      [&](const ContactPlane& p) {
-                       return p.pressed(p.gap(places.data()), s.contact.found().stiffness) > 0.0;
+                       return p.updated_pressure(p.gap(places.data()), s.contact.found().stiffness) > 0.0;
                      });
 }
 
-double press_contact(RadialState& s) {
-  if (!s.contact.presses()) return 0.0;
-  return s.contact.press(contact_places(s).data(), Vector::Ones(s.contact.surface_count()));
+double update_pressures(RadialState& s) {
+  if (!s.contact.has_planes()) return 0.0;
+  return s.contact.update_pressures(contact_places(s).data(), Vector::Ones(s.contact.surface_count()));
 }
 
 bool is_deep(RadialState& s) {
@@ -87,8 +87,8 @@ bool is_deep(RadialState& s) {
                      [&](const ContactPlane& p) { return p.gap(places.data()) < -deep_in_motion; });
 }
 
-void press_balanced(RadialState& s) {
-  if (!s.contact.presses()) return;
+void update_balanced_pressures(RadialState& s) {
+  if (!s.contact.has_planes()) return;
   const RadialObjective<float>& objective = *s.fast.objective.latest();
   const TallMatrix<float>& inverse_factor = s.preconditioner.inverse_factor.latest();
   const Points places = contact_places(s);
@@ -104,8 +104,8 @@ void press_balanced(RadialState& s) {
     PointsF forces = PointsF::Zero(places.rows(), 3);
     for (const ContactPlane& plane : s.contact.found().planes) {
       if (plane.obstacle != k) continue;
-      const double pressed = plane.pressed(plane.gap(places.data()), s.contact.found().stiffness);
-      const Eigen::RowVector3f force = (plane.share * pressed * plane.normal).transpose().cast<float>();
+      const double pressed = plane.updated_pressure(plane.gap(places.data()), s.contact.found().stiffness);
+      const Eigen::RowVector3f force = (plane.area * pressed * plane.normal).transpose().cast<float>();
       forces.row(plane.first) += force;
       if (plane.second >= 0) forces.row(plane.second) -= force;
     }
@@ -120,11 +120,11 @@ void press_balanced(RadialState& s) {
       const double left = answer[k] - products.row(k).dot(shares) + products(k, k) * shares[k];
       shares[k] = products(k, k) > 0.0 ? std::clamp(left / products(k, k), 0.0, 1.0) : 0.0;
     }
-  s.contact.press(places.data(), shares);
+  s.contact.update_pressures(places.data(), shares);
 }
 
 void push_out(RadialState& s) {
-  if (!s.contact.presses()) return;
+  if (!s.contact.has_planes()) return;
   const RadialObjective<float>& objective = *s.fast.objective.latest();
   const TallMatrix<float>& inverse_factor = s.preconditioner.inverse_factor.latest();
   const ContactSet& set = s.contact.found();

@@ -14,10 +14,10 @@ void push_out(RadialState& state);
 void stiffen_contact(RadialState& state);
 /// Augmented-Lagrangian update of the pressures (multipliers) by the gaps. Returns their relative change, 0
 /// to 1.
-double press_contact(RadialState& state);
+double update_pressures(RadialState& state);
 /// The same, with each surface's pressures scaled by a factor in [0, 1] that best balances all other forces:
 /// before a descent has converged, gaps times stiffness are no forces.
-void press_balanced(RadialState& state);
+void update_balanced_pressures(RadialState& state);
 /// Whether any plane is active: its updated pressure would be above 0.
 bool would_press(RadialState& state);
 /// Whether a point penetrates deeper than a time step may leave it.

@@ -23,8 +23,8 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
   if (motions.empty() || s.contact.found().planes.empty()) return by;
   HandleBounds bounds(s, motions);
   for (std::size_t i = 0; i < motions.size(); ++i) {
-    const auto [way, surface] = bounds.least_translation(static_cast<Index>(i));
-    motions[i].topRightCorner<3, 1>() += way;
+    const auto [translation, surface] = bounds.least_translation(static_cast<Index>(i));
+    motions[i].topRightCorner<3, 1>() += translation;
     by[i] = surface;
   }
   return by;

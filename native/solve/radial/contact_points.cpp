@@ -44,7 +44,7 @@ Index ContactPoints::sample_of(Index row) const {
   return row < sample_count() ? row : parents_[static_cast<std::size_t>(row - sample_count())];
 }
 
-double ContactPoints::share(Index row) const {
+double ContactPoints::area(Index row) const {
   const double whole = 1.0 / static_cast<double>(sample_count());
   return row < coarse_ ? whole : 0.5 * whole;
 }

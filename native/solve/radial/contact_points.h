@@ -29,7 +29,7 @@ class ContactPoints {
   /// The sample itself, or the parent sample of a vertex or refined point.
   Index sample_of(Index row) const;
   /// The area weight of a point, as a fraction of the surface's area.
-  double share(Index row) const;
+  double area(Index row) const;
   Points rest(const std::vector<Index>& rows) const;
   /// Rest positions in the basis' interior embedding; empty without one.
   Points embedded(const std::vector<Index>& rows) const;

@@ -55,10 +55,10 @@ Index ContactTerms::sample_of(Index place) const {
   return points_.samples()[static_cast<std::size_t>(points_.sample_of(row))];
 }
 
-double ContactSet::touching() const {
+double ContactSet::contact_area() const {
   double share = 0.0;
   for (const ContactPlane& plane : planes)
-    if (plane.pressure > 0.0) share += plane.share;
+    if (plane.pressure > 0.0) share += plane.area;
   return share;
 }
 
@@ -72,40 +72,40 @@ Points ContactSet::forces_at(const Vec3& place, const double* now, Index surface
   Points forces = Points::Zero(surfaces, 3);
   for (const ContactPlane& plane : planes) {
     const double share = nearness(now, plane.first, place) - nearness(now, plane.second, place);
-    forces.row(plane.obstacle) += share * plane.share * plane.pressure * plane.normal.transpose();
+    forces.row(plane.obstacle) += share * plane.area * plane.pressure * plane.normal.transpose();
   }
   return forces;
 }
 
-double ContactTerms::press(const double* places, const Vector& shares) {
+double ContactTerms::update_pressures(const double* places, const Vector& factors) {
   double change = 0.0, most = 0.0;
   for (ContactPlane& plane : found_.planes) {
     const double before = plane.pressure;
     const double gap = std::max(-shallow, plane.gap(places));
-    plane.pressure = shares[plane.obstacle] * plane.pressed(gap, found_.stiffness);
+    plane.pressure = factors[plane.obstacle] * plane.updated_pressure(gap, found_.stiffness);
     pressures_(found_.rows[static_cast<std::size_t>(plane.first)], plane.obstacle) = plane.pressure;
-    change += plane.share * std::abs(plane.pressure - before);
-    most += plane.share * std::max(plane.pressure, before);
+    change += plane.area * std::abs(plane.pressure - before);
+    most += plane.area * std::max(plane.pressure, before);
   }
-  if (grips_) grip();
+  if (has_friction_) add_friction();
   return most > 0.0 ? change / most : 0.0;
 }
 
-void ContactTerms::grip() {
-  grips_ = true;
+void ContactTerms::add_friction() {
+  has_friction_ = true;
   const double coefficient = contact_ ? contact_->friction : Contact().friction;
   for (ContactPlane& plane : found_.planes)
-    if (plane.second < 0) plane.grip = coefficient * plane.pressure;
+    if (plane.second < 0) plane.friction = coefficient * plane.pressure;
 }
 
-void ContactSet::harden(bool more) {
+void ContactSet::adapt_stiffness(bool raise) {
   double sum = 0.0, share = 0.0;
   for (const ContactPlane& plane : planes) {
-    sum += plane.share * plane.pressure;
-    if (plane.pressure > 0.0) share += plane.share;
+    sum += plane.area * plane.pressure;
+    if (plane.pressure > 0.0) share += plane.area;
   }
   const double fitting = share > 0.0 ? sum / share / hover : 0.0;
-  const double wanted = std::max({softest, fitting, (more ? harder : softer) * stiffness});
+  const double wanted = std::max({softest, fitting, (raise ? harder : softer) * stiffness});
   stiffness = std::min(wanted, hardest);
 }
 

@@ -10,9 +10,9 @@
 namespace arapfields {
 namespace {
 
-/// Most iterations of comes_apart()'s solve without contact.
+/// Most iterations of escapes_local_minimum()'s solve without contact.
 constexpr Index steps_apart = 60;
-/// Most solves of pushes_apart() after a leap: the first one often leaves parts a little in each other.
+/// Most solves of separates_parts() after a leap: the first one often leaves parts a little in each other.
 constexpr int most_solves_apart = 3;
 /// Relative decrease of the energy with which its solution replaces the current one.
 constexpr double better = 0.01;
@@ -21,7 +21,7 @@ constexpr double better = 0.01;
 void report_contact(RadialState& s) {
   const double depth = s.contact.deepest();
   s.report.contact = {s.problem.frame().scale * depth,
-                      s.contact.found().touching(),
+                      s.contact.found().contact_area(),
                       depth > ContactSet::deep,
                       held_back_handles(s),
                       {}};
@@ -39,17 +39,17 @@ struct Before {
   RadialShape shape;
   SolveHistory history;
   RadialReport report;
-  ContactPressing pressing;
+  ContactSnapshot snapshot;
 
   explicit Before(const RadialState& s)
-      : shape(s.shape), history(s.history), report(s.report), pressing(s.contact.pressing()) {}
+      : shape(s.shape), history(s.history), report(s.report), snapshot(s.contact.snapshot()) {}
   void restore(RadialState& s) {
     s.shape.coefficients = shape.coefficients;
     s.shape.jumps = shape.jumps;
     ++s.shape.revision;
     s.history = std::move(history);
     s.report = std::move(report);
-    s.contact.set_pressing(std::move(pressing));
+    s.contact.restore(std::move(snapshot));
     s.contact.find(s.shape.coefficients);
   }
 };
@@ -74,17 +74,17 @@ void ContactSolve::follow() {
   RadialState& s = state_;
   const bool goes_on = s.contact.ended_at(s.shape.revision);
   steps_.sweep(motions_);
-  const bool pressed = s.contact.presses();
+  const bool pressed = s.contact.has_planes();
   s.contact.find(s.shape.coefficients);
   if (!goes_on && s.contact.deepest_outside() > ContactApproach::too_deep) start_at_rest();
-  if (comes_apart()) return;
-  bool slowly = s.in_one_go && !s.contact.crossing().empty();
-  const bool leaps = s.contact.only_itself() && way() > steps_.length(ContactApproach::usual);
-  if (leaps || (!pressed && may_be_clear())) {
+  if (escapes_local_minimum()) return;
+  bool slowly = s.in_one_go && !s.contact.crossing_surfaces().empty();
+  const bool leaps = s.contact.only_itself() && longest_motion() > steps_.length(ContactApproach::usual);
+  if (leaps || (!pressed && may_be_without_contact())) {
     const RowMatrix<double> start = s.shape.coefficients;
-    if (ends_clear()) return;
+    if (ends_without_contact()) return;
     const bool parts_overlap = s.contact.deepest_outside() <= 0.0;
-    if (parts_overlap && pushes_apart(leaps ? most_solves_apart : 1)) return;
+    if (parts_overlap && separates_parts(leaps ? most_solves_apart : 1)) return;
     slowly = slowly || (parts_overlap && s.in_one_go);
     go_back(start);
   }
@@ -98,7 +98,7 @@ void ContactSolve::start_at_rest() {
 }
 
 /// The longest distance of a handle's target from its position under the last motions, in cube units.
-double ContactSolve::way() const {
+double ContactSolve::longest_motion() const {
   const HandleTerms& handles = state_.handles;
   const Points from = handles.targets_at(motions_between(handles.bound(), motions_, 0.0));
   return (handles.pairs().targets - from).rowwise().norm().maxCoeff();
@@ -125,7 +125,7 @@ bool ContactSolve::starts_better(const RowMatrix<double>& coefficients) {
 /// If self-contact holds a handle back, the shape may be in a poor local minimum: tries a solve without
 /// contact, and if the handles do not move, a projection of what overlaps after it. Returns whether the
 /// result is accepted; if not, the state is restored.
-bool ContactSolve::comes_apart() {
+bool ContactSolve::escapes_local_minimum() {
   RadialState& s = state_;
   const std::vector<HeldBack>& held = s.report.contact.held;
   const Points& targets = s.handles.pairs().targets;
@@ -133,7 +133,7 @@ bool ContactSolve::comes_apart() {
     s.tried = {};
     return false;
   }
-  const bool rests = way() == 0.0;
+  const bool rests = longest_motion() == 0.0;
   const bool again = s.tried.targets.rows() == targets.rows();
   const double tried_within = rests ? 0.0 : ContactApproach::usual.length;
   if (again && (targets - s.tried.targets).rowwise().norm().maxCoeff() <= tried_within) return false;
@@ -157,12 +157,12 @@ bool ContactSolve::comes_apart() {
   return false;
 }
 
-bool ContactSolve::may_be_clear() const {
+bool ContactSolve::may_be_without_contact() const {
   return state_.contact.deepest() <= 0.0 && !state_.contact.touches_itself();
 }
 
 /// Solves without contact. Returns whether nothing penetrates after it.
-bool ContactSolve::ends_clear() {
+bool ContactSolve::ends_without_contact() {
   RadialState& s = state_;
   s.contact.release();
   freely_(iterations_);
@@ -177,7 +177,7 @@ bool ContactSolve::ends_clear() {
 
 /// Separates parts that overlap after a solve without contact, by so many solves in contact at most, while
 /// the constraints that were found are violated. Returns whether that succeeds.
-bool ContactSolve::pushes_apart(int most_solves) {
+bool ContactSolve::separates_parts(int most_solves) {
   bool apart = false;
   for (int solve = 0; solve < most_solves && !apart; ++solve) {
     if (solve > 0 && state_.contact.deepest() <= ContactSet::deep) return false;
@@ -191,8 +191,8 @@ bool ContactSolve::pushes_apart(int most_solves) {
 /// Continuation in usual steps; `slowly`: in small steps as well, and the better of both results is kept.
 void ContactSolve::approach(bool slowly) {
   const RowMatrix<double> start = state_.shape.coefficients;
-  steps_.approach(motions_, way(), ContactApproach::usual);
-  if (slowly && way() > steps_.length(ContactApproach::small)) approach_again_slowly(start);
+  steps_.approach(motions_, longest_motion(), ContactApproach::usual);
+  if (slowly && longest_motion() > steps_.length(ContactApproach::small)) approach_again_slowly(start);
   report_contact(state_);
 }
 
@@ -205,12 +205,12 @@ void ContactSolve::approach_again_slowly(const RowMatrix<double>& start) {
   };
   const std::pair<bool, double> bad = badness();
   const RowMatrix<double> there = s.shape.coefficients;
-  ContactPressing pressing = s.contact.pressing();
+  ContactSnapshot snapshot = s.contact.snapshot();
   go_back(start);
-  steps_.approach(motions_, way(), ContactApproach::small);
+  steps_.approach(motions_, longest_motion(), ContactApproach::small);
   if (!(bad < badness())) return;
   go_back(there);
-  s.contact.set_pressing(std::move(pressing));
+  s.contact.restore(std::move(snapshot));
   s.contact.find(s.shape.coefficients);
 }
 

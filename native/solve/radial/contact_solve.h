@@ -22,12 +22,12 @@ class ContactSolve {
 
  private:
   void start_at_rest();
-  double way() const;
-  bool comes_apart();
+  double longest_motion() const;
+  bool escapes_local_minimum();
   bool starts_better(const RowMatrix<double>& coefficients);
-  bool may_be_clear() const;
-  bool ends_clear();
-  bool pushes_apart(int most_solves);
+  bool may_be_without_contact() const;
+  bool ends_without_contact();
+  bool separates_parts(int most_solves);
   void approach(bool slowly);
   void approach_again_slowly(const RowMatrix<double>& start);
   void go_back(const RowMatrix<double>& coefficients);

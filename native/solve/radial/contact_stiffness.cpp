@@ -22,13 +22,13 @@ ContactStiffness::ContactStiffness(const RadialBasis& basis, const ContactSet& s
   };
   std::vector<Spring> springs;
   for (const ContactPlane& plane : set.planes) {
-    if (plane.pressed(plane.gap(places.data()), set.stiffness) <= 0.0) continue;
-    springs.push_back({&plane, plane.normal, set.stiffness * plane.share});
-    if (plane.grip <= 0.0) continue;
+    if (plane.updated_pressure(plane.gap(places.data()), set.stiffness) <= 0.0) continue;
+    springs.push_back({&plane, plane.normal, set.stiffness * plane.area});
+    if (plane.friction <= 0.0) continue;
     const Vec3 first = plane.normal.unitOrthogonal();
     for (const Vec3& along : {first, Vec3(plane.normal.cross(first))})
       springs.push_back(
-          {&plane, along, plane.grip / std::max(stuck, plane.slip(places.data()).norm()) * plane.share});
+          {&plane, along, plane.friction / std::max(stuck, plane.slip(places.data()).norm()) * plane.area});
   }
   const Index all = std::ssize(springs), count = std::min<Index>(all, most_planes);
   if (count == 0) return;

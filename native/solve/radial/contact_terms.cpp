@@ -25,7 +25,7 @@ constexpr double same_side = 0.3, opposite = -0.5;
 /// The cosine of neighbouring planes' normals below which an obstacle has an edge between them.
 constexpr double smooth = 0.9;
 /// Safety distance in self-contact, twice that of obstacles: both sides are known at samples alone.
-constexpr double kept_itself = 2.0 * ContactTerms::kept;
+constexpr double safety_distance_itself = 2.0 * ContactTerms::safety_distance;
 /// Tolerance, in cube units, of the test whether a path may have crossed a surface: one that goes straight
 /// through a sheet is exactly as long as the distances at its ends together.
 constexpr double unsure = 1e-4;
@@ -37,7 +37,7 @@ void go_back(const BarrierSurface& surface, PointsIn now, const std::vector<Inde
              Vector& offsets) {
   for (std::size_t m = 0; m < moved_rows.size(); ++m) {
     const BarrierSurface::Hit& hit = hits[m];
-    if (hit.share > 1.0) continue;
+    if (hit.parameter > 1.0) continue;
     const Index i = moved_rows[m];
     const double beyond = hit.normal.dot(now.row(i).transpose() - hit.place);
     if (surface.is_sheet() && beyond < 0.0) {  // the side where the path began counts as outside
@@ -60,7 +60,7 @@ void go_back(const BarrierSurface& surface, PointsIn now, const std::vector<Inde
 void hold_behind(const std::vector<BarrierSurface::Hit>& hits, const std::vector<Index>& rows,
                  Vector& distances) {
   for (std::size_t m = 0; m < rows.size(); ++m)
-    if (hits[m].share <= 1.0) distances[rows[m]] = std::min(0.0, distances[rows[m]]);
+    if (hits[m].parameter <= 1.0) distances[rows[m]] = std::min(0.0, distances[rows[m]]);
 }
 
 /// Samples near an edge of an obstacle, which may poke through between them and their neighbours.
@@ -77,9 +77,9 @@ std::vector<Index> at_edges(const ContactSet& found, ContactPoints& points,
     for (; last < found.planes.size() && found.planes[last].obstacle == k; ++last)
       if (found.planes[last].first < points.sample_count())
         of[static_cast<std::size_t>(found.planes[last].first)] = &found.planes[last];
-    for (; first < last && !surfaces[static_cast<std::size_t>(k)].is_flat(); ++first) {
+    for (; first < last && !surfaces[static_cast<std::size_t>(k)].is_ground(); ++first) {
       const ContactPlane& plane = found.planes[first];
-      if (plane.first >= points.sample_count() || plane.start > reach) continue;
+      if (plane.first >= points.sample_count() || plane.initial_gap > reach) continue;
       for (const Index other : points.neighbours(plane.first)) {
         const ContactPlane* const beside = of[static_cast<std::size_t>(other)];
         if (beside == nullptr || beside->normal.dot(plane.normal) > smooth) continue;
@@ -111,11 +111,11 @@ void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<do
     places_ = points_.at(coefficients);
     for (Index k = 0; k < std::ssize(surfaces_); ++k) {
       BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
-      if (surface.is_alike(before[static_cast<std::size_t>(k)]))
+      if (surface.has_same_function(before[static_cast<std::size_t>(k)]))
         surface.set_placement(before[static_cast<std::size_t>(k)].placement());  // tracking continues
       else {
-        see(k);
-        ways_.cross(k, surface, points_, places_);
+        start_tracking(k);
+        sides_.find_crossings(k, surface, points_, places_);
       }
       starts_.push_back(surface.placement());
     }
@@ -123,13 +123,13 @@ void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<do
   }
   gather_surfaces();
   self_.reset();
-  if (contact_ && contact_->itself) self_.emplace(problem_, points_.samples(), kept_itself);
+  if (contact_ && contact_->itself) self_.emplace(problem_, points_.samples(), safety_distance_itself);
   begin(coefficients);
 }
 
-bool ContactTerms::set_further_ground(const std::optional<Ground>& ground) {
-  if (ground == further_ground_) return false;
-  further_ground_ = ground;
+bool ContactTerms::set_second_ground(const std::optional<Ground>& ground) {
+  if (ground == second_ground_) return false;
+  second_ground_ = ground;
   gather_surfaces();
   return true;
 }
@@ -141,10 +141,10 @@ void ContactTerms::gather_surfaces() {
     if (contact_->ground)
       surfaces_.push_back(BarrierSurface::ground({*contact_->ground, contact_->up}, problem_.frame()));
   }
-  if (further_ground_) surfaces_.push_back(BarrierSurface::ground(*further_ground_, problem_.frame()));
+  if (second_ground_) surfaces_.push_back(BarrierSurface::ground(*second_ground_, problem_.frame()));
   ends_.clear();
   for (const BarrierSurface& surface : surfaces_) ends_.push_back(surface.placement());
-  carried_.assign(surfaces_.size(), Mat4::Identity());
+  obstacle_motions_.assign(surfaces_.size(), Mat4::Identity());
   starts_.clear();
   if (!surfaces_.empty() || (contact_ && contact_->itself)) points_.choose();
 }
@@ -165,10 +165,10 @@ void ContactTerms::release() {
 std::vector<Index> ContactTerms::near_rows() const {
   std::vector<Index> rows;
   for (Index i = 0; i < places_.rows(); ++i)
-    for (Index k = 0; k < ways_.clear.cols(); ++k) {
+    for (Index k = 0; k < sides_.clearance.cols(); ++k) {
       const auto which = static_cast<std::size_t>(k);
-      const double way = (places_.row(i) - ways_.seen[which].row(i)).norm();
-      if (ways_.clear(i, k) - way < near + further_ + surfaces_[which].margin()) {
+      const double moved = (places_.row(i) - sides_.outside[which].row(i)).norm();
+      if (sides_.clearance(i, k) - moved < near + extra_ + surfaces_[which].margin()) {
         rows.push_back(i);
         break;
       }
@@ -179,24 +179,24 @@ std::vector<Index> ContactTerms::near_rows() const {
 /// Adds the planes of obstacles and grounds for these points, and updates their last outside positions.
 void ContactTerms::find_outside(const std::vector<Index>& rows) {
   const Points now = rows_of(places_, rows);
-  for (Index k = 0; k < ways_.clear.cols(); ++k) {
+  for (Index k = 0; k < sides_.clearance.cols(); ++k) {
     const Vector distances = add_planes(k, rows, now);
     for (Index i = 0; i < now.rows(); ++i) {
       if (distances[i] <= 0.0) continue;  // inside: keeps its last outside position
       const Index row = rows[static_cast<std::size_t>(i)];
-      ways_.seen[static_cast<std::size_t>(k)].row(row) = now.row(i);
-      ways_.clear(row, k) = distances[i];
+      sides_.outside[static_cast<std::size_t>(k)].row(row) = now.row(i);
+      sides_.clearance(row, k) = distances[i];
     }
   }
 }
 
-double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<double> further, bool jumped) {
-  if (known_ && !grips_ && !jumped && further.value_or(0.0) <= further_ && points_.is_at(coefficients))
+double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<double> extra, bool jumped) {
+  if (known_ && !has_friction_ && !jumped && extra.value_or(0.0) <= extra_ && points_.is_at(coefficients))
     return deepest_;
   known_ = true;
   const Points before = std::exchange(places_, points_.at(coefficients));
-  further_ = further ? *further : std::sqrt((places_ - before).rowwise().squaredNorm().maxCoeff());
-  grips_ = false;
+  extra_ = extra ? *extra : std::sqrt((places_ - before).rowwise().squaredNorm().maxCoeff());
+  has_friction_ = false;
   found_.planes.clear();
   deepest_ = 0.0;
   find_outside(near_rows());
@@ -209,7 +209,7 @@ double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<d
     places_.bottomRows(finer.rows()) = finer;
     pressures_.conservativeResize(places_.rows(), Eigen::NoChange);
     pressures_.bottomRows(finer.rows()).setZero();
-    add_finer_ways();
+    extend_sides();
     std::vector<Index> rows(static_cast<std::size_t>(finer.rows()));
     std::iota(rows.begin(), rows.end(), known);
     find_outside(rows);
@@ -225,44 +225,44 @@ double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<d
 /// are negative also for points that have tunnelled through it.
 Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsIn now) {
   const BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
-  const Points& seen = ways_.seen[static_cast<std::size_t>(k)];
+  const Points& outside = sides_.outside[static_cast<std::size_t>(k)];
   BarrierSurface::Nearest nearest = surface.nearest(now);
   std::vector<Index> moved_rows, starts;  // points that may have crossed: rows of `now`, and of all points
   for (Index i = 0; i < now.rows(); ++i) {
     const Index row = rows[static_cast<std::size_t>(i)];
-    const double way = (now.row(i) - seen.row(row)).norm(), clear = ways_.clear(row, k);
-    if (clear > 0.0 && way > clear + std::max(0.0, nearest.distances[i]) - unsure)
+    const double moved = (now.row(i) - outside.row(row)).norm(), clearance = sides_.clearance(row, k);
+    if (clearance > 0.0 && moved > clearance + std::max(0.0, nearest.distances[i]) - unsure)
       moved_rows.push_back(i), starts.push_back(row);
   }
   const std::vector<BarrierSurface::Hit> hits =
-      surface.first_hits(rows_of(seen, starts), rows_of(now, moved_rows));
+      surface.first_hits(rows_of(outside, starts), rows_of(now, moved_rows));
   Vector offsets(now.rows());
   for (Index i = 0; i < now.rows(); ++i)
     offsets[i] = nearest.normals.row(i).dot(now.row(i)) - nearest.distances[i];
-  go_back(surface, now, moved_rows, hits, near + further_, nearest, offsets);
-  const Points carried = affine_image(now, carried_[static_cast<std::size_t>(k)]);
+  go_back(surface, now, moved_rows, hits, near + extra_, nearest, offsets);
+  const Points carried = affine_image(now, obstacle_motions_[static_cast<std::size_t>(k)]);
   for (Index i = 0; i < now.rows(); ++i) {
     const Index row = rows[static_cast<std::size_t>(i)];
-    const bool crossed = ways_.crosses(k, points_.sample_of(row));
-    double margin = surface.margin() + kept;
-    if (crossed) margin = std::clamp(ways_.clear(row, k), 0.0, margin);  // not more than it had at first
+    const bool crossed = sides_.crosses(k, points_.sample_of(row));
+    double margin = surface.margin() + safety_distance;
+    if (crossed) margin = std::clamp(sides_.clearance(row, k), 0.0, margin);  // not more than it had at first
     const double gap = nearest.distances[i] - margin;
-    const bool left = ways_.clear(row, k) == ContactWays::left_inside && nearest.distances[i] < 0.0;
-    if (left || gap > near + further_) {
+    const bool left = sides_.clearance(row, k) == ContactSides::left_inside && nearest.distances[i] < 0.0;
+    if (left || gap > near + extra_) {
       pressures_(row, k) = 0.0;
       continue;
     }
-    deepest_ = std::max(deepest_, -gap - kept);
+    deepest_ = std::max(deepest_, -gap - safety_distance);
     ContactPlane& plane = found_.planes.emplace_back();
     plane.first = row;
     plane.normal = nearest.normals.row(i).transpose();
     plane.offset = offsets[i] + margin;
-    plane.start = gap;
+    plane.initial_gap = gap;
     plane.pressure = pressures_(row, k);
-    plane.share = points_.share(row);
+    plane.area = points_.area(row);
     plane.obstacle = k;
     plane.anchor = carried.row(i).transpose();
-    auto anchor = ways_.anchors[static_cast<std::size_t>(k)].row(row);
+    auto anchor = sides_.anchors[static_cast<std::size_t>(k)].row(row);
     if (plane.pressure > 0.0) {  // the anchor follows a sliding point at the distance `stuck`
       const Vec3 slip = plane.along(plane.anchor - anchor.transpose());
       plane.anchor -= std::min(1.0, stuck / slip.norm()) * slip;
@@ -282,9 +282,9 @@ void ContactTerms::add_own_planes(const RowMatrix<double>& coefficients, bool ju
   const auto normals = [&](auto* blocks) { return points_.normals_at(coefficients, blocks); };
   const Points samples = places_.topRows(points_.sample_count());
   for (const FacingPair& pair :
-       self_->find(samples, normals, std::min(near_itself + further_, farthest), jumped)) {
+       self_->find(samples, normals, std::min(near_itself + extra_, farthest), jumped)) {
     pressures_(pair.first, own) = before[pair.first];
-    deepest_ = std::max(deepest_, pair.least - kept - pair.gap);
+    deepest_ = std::max(deepest_, pair.least - safety_distance - pair.gap);
     touches_itself_ = touches_itself_ || pair.gap < pair.least - slight;
     ContactPlane& plane = found_.planes.emplace_back();
     plane.first = pair.first;
@@ -292,7 +292,7 @@ void ContactTerms::add_own_planes(const RowMatrix<double>& coefficients, bool ju
     plane.normal = pair.normal;
     plane.offset = pair.least;
     plane.pressure = before[pair.first];
-    plane.share = points_.share(pair.first);
+    plane.area = points_.area(pair.first);
     plane.obstacle = own;
   }
 }

@@ -7,7 +7,7 @@
 
 #include "solve/radial/barrier_surface.h"
 #include "solve/radial/contact_points.h"
-#include "solve/radial/contact_ways.h"
+#include "solve/radial/contact_sides.h"
 #include "solve/radial/secondary_motion.h"
 
 namespace arapfields {
@@ -17,13 +17,13 @@ namespace arapfields {
 class ContactTerms {
  public:
   /// Safety distance beyond each margin, in cube units, larger than the depth that solves leave.
-  static constexpr double kept = 1.5e-3;
+  static constexpr double safety_distance = 1.5e-3;
   explicit ContactTerms(const RadialProblem& problem) : problem_(problem), points_(problem) {}
   void prepare(const Progress& progress) { points_.choose(progress); }  ///< the expensive part of set()
   /// Obstacles that have moved keep their placements until move_obstacles(). Throws InvalidInput.
   void set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients);
   /// Sets a second ground, beside the contact's own; returns whether it has changed.
-  bool set_further_ground(const std::optional<Ground>& ground);
+  bool set_second_ground(const std::optional<Ground>& ground);
   const std::optional<Contact>& contact() const { return contact_; }
   bool any() const { return !surfaces_.empty() || self_; }
   bool itself() const { return self_.has_value(); }
@@ -32,38 +32,38 @@ class ContactTerms {
   /// Starts tracking at this shape, with zero pressures and the obstacles at their current placements.
   void begin(const RowMatrix<double>& coefficients) { resume({}, coefficients); }
   /// The state that the next time step depends on; resume() restores it.
-  ContactState held() const;
+  ContactState state() const;
   void resume(const ContactState& state, const RowMatrix<double>& coefficients);
   /// Applies a rigid change of the cube's coordinates.
   void change_coordinates(const Mat4& motion);
   /// Interpolates placements from those at resume() to the current ones. `ahead`: the surface moves later.
   void move_obstacles(double share, bool ahead = false);
   /// Upper bound of the remaining motion of a point in an obstacle's cube, in cube units.
-  double obstacle_way() const;
+  double longest_obstacle_motion() const;
 
   /// Moves the contact points and finds the contact planes near them. Returns the greatest penetration depth
-  /// beyond a margin. `further` is added to the search distance, in cube units; none: the largest motion of a
-  /// point since the last search. `jumped`: the path is unknown; facing normals tell self-penetration.
-  double find(const RowMatrix<double>& coefficients, std::optional<double> further = 0.0,
-              bool jumped = false);
-  ContactWays ways() const;
-  /// Undoes all searches since ways() returned this.
-  void set_ways(ContactWays ways);
+  /// beyond a margin. `extra` is added to the search distance, in cube units; none: the largest
+  /// motion of a point since the last search. `jumped`: the path is unknown; facing normals tell
+  /// self-penetration.
+  double find(const RowMatrix<double>& coefficients, std::optional<double> extra = 0.0, bool jumped = false);
+  ContactSides sides() const;
+  /// Undoes all searches since sides() returned this.
+  void set_sides(ContactSides sides);
   /// The state to return to after a rejected trial.
-  ContactPressing pressing() const { return {ways(), pressures_, found_.stiffness}; }
-  void set_pressing(ContactPressing pressing);
+  ContactSnapshot snapshot() const { return {sides(), pressures_, found_.stiffness}; }
+  void restore(ContactSnapshot snapshot);
   /// The largest speed of a contact point for these rates of the coefficients.
   double fastest(const RowMatrix<double>& rates) {
     return std::sqrt(points_.at(rates).rowwise().squaredNorm().maxCoeff());
   }
   /// Multiplier update at the positions (n,3) of found()'s points, times a factor for each surface. Returns
   /// the pressures' relative change, 0 to 1.
-  double press(const double* places, const Vector& shares);
+  double update_pressures(const double* places, const Vector& factors);
   /// Number of obstacles and grounds, and one for the shape itself.
   Index surface_count() const { return pressures_.cols(); }
   /// Gives the planes Coulomb friction of their current pressures.
-  void grip();
-  void harden(bool more) { found_.harden(more); }
+  void add_friction();
+  void adapt_stiffness(bool raise) { found_.adapt_stiffness(raise); }
   /// Removes all planes and pressures.
   void release();
   /// Records the shape's revision at which a solve with this contact ended, and compares it.
@@ -72,49 +72,49 @@ class ContactTerms {
 
   const ContactSet& found() const { return found_; }
   Index sample_of(Index place) const;  ///< row of the problem's samples of a point of found()
-  bool presses() const { return !found_.planes.empty(); }
+  bool has_planes() const { return !found_.planes.empty(); }
   std::string name_of(Index surface) const;
   const std::vector<BarrierSurface>& surfaces() const { return surfaces_; }  ///< obstacles and the ground
   double deepest() const { return deepest_; }
   double deepest_outside() const { return deepest_outside_; }  ///< without self-contact
   /// Whether parts of the surface touched each other at the last search.
   bool touches_itself() const { return touches_itself_; }
-  std::vector<Index> crossing() const { return ways_.crossing(); }  ///< obstacles with points left inside
+  std::vector<Index> crossing_surfaces() const { return sides_.crossing_surfaces(); }
   /// Whether a part is inside another one at this shape, however deep.
   bool overlaps(const RowMatrix<double>& coefficients);
 
  private:
   void gather_surfaces();
-  void see(Index k);
+  void start_tracking(Index k);
   std::vector<Index> near_rows() const;
   void find_outside(const std::vector<Index>& rows);
   Vector add_planes(Index k, const std::vector<Index>& rows, PointsIn now);
-  void add_finer_ways();
+  void extend_sides();
   void add_own_planes(const RowMatrix<double>& coefficients, bool jumped);
   void gather_places();
 
   const RadialProblem& problem_;
   std::optional<Contact> contact_;
-  std::optional<Ground> further_ground_;
+  std::optional<Ground> second_ground_;
   std::vector<BarrierSurface> surfaces_;
-  std::vector<Mat4> starts_;   // placements that move_obstacles() interpolates from
-  std::vector<Mat4> ends_;     // and to
-  std::vector<Mat4> carried_;  // the motions of its last call
+  std::vector<Mat4> starts_;            // placements that move_obstacles() interpolates from
+  std::vector<Mat4> ends_;              // and to
+  std::vector<Mat4> obstacle_motions_;  // the motions of its last call
   ContactPoints points_;
   Points places_;  // positions at the last search
   std::optional<SelfContact> self_;
-  ContactWays ways_;
+  ContactSides sides_;
   RowMatrix<double> pressures_;  // (points, surface_count()) multipliers
   ContactSet found_;
   Revision sets_ = 0;  // number of contact sets so far
   std::optional<Revision> ended_;
   double deepest_ = 0.0;
   double deepest_outside_ = 0.0;
-  double further_ = 0.0;
+  double extra_ = 0.0;  // the last search's `extra`
   bool touches_itself_ = false;
-  bool ahead_ = false;  // obstacles have moved, and the surface has not followed yet
-  bool grips_ = false;  // whether the planes have friction
-  bool known_ = false;  // whether the last search is valid for its coefficients
+  bool ahead_ = false;         // obstacles have moved, and the surface has not followed yet
+  bool has_friction_ = false;  // whether the planes have friction
+  bool known_ = false;         // whether the last search is valid for its coefficients
 };
 
 }  // namespace arapfields

@@ -26,9 +26,9 @@ constexpr double unmoved = 1e-3;
 /// Searches for the thickest part of the shape near a point handle, which may lie at a thin edge.
 constexpr int thicker = 3;
 /// Planes of curved solids are linearised anew, at most so many times, until the translation changes by less
-/// than `turned_enough`, in cube units.
-constexpr int most_turns = 6;
-constexpr double turned_enough = 1e-4;
+/// than `unchanged`, in cube units.
+constexpr int most_times = 6;
+constexpr double unchanged = 1e-4;
 /// A plane is linearised anew if the translated point is within `near_bound` of it, in cube units, and the
 /// cosine of the new normal with the old one is at least `same_side`.
 constexpr double near_bound = 0.05, same_side = 0.0;
@@ -38,8 +38,9 @@ Vector masses_of(const BoundHandles& handles) {
   Vector masses(handles.count());
   for (Index i = 0; i < handles.count(); ++i) {
     const Index begin = handles.begin(i), rows = handles.begin(i + 1) - begin;
-    const Points way = handles.targets().middleRows(begin, rows) - handles.sources().middleRows(begin, rows);
-    masses[i] = static_cast<double>(rows) / (way.rowwise().squaredNorm().mean() + unmoved * unmoved);
+    const Points motion =
+        handles.targets().middleRows(begin, rows) - handles.sources().middleRows(begin, rows);
+    masses[i] = static_cast<double>(rows) / (motion.rowwise().squaredNorm().mean() + unmoved * unmoved);
   }
   return masses;
 }
@@ -73,7 +74,7 @@ Vector widths_at(const RadialProblem& problem, const Points& points) {
 }
 
 /// The sample nearest to each sample's reflection.
-const std::vector<Index>& mirrored(RadialState& s) {
+const std::vector<Index>& mirror_samples(RadialState& s) {
   return s.mirrored.get({1}, [&] {
     const Points& samples = s.problem.surface();
     const Points alike = Points::Zero(samples.rows(), 3);
@@ -117,7 +118,7 @@ std::vector<HandleBounds::Pin> HandleBounds::pins() const {
 
 /// Depth of the bound on a pin that keeps the rest distance between it and a contact point under it; −∞: the
 /// point is not under it.
-double HandleBounds::beyond(const Pin& pin, const Vec3& normal, double offset, const Place& place) {
+double HandleBounds::depth_of(const Pin& pin, const Vec3& normal, double offset, const Place& place) {
   const double length = (place.rest - pin.rest).norm();
   const Vec3 arm = place.now - pin.now;
   const double along = normal.dot(arm);
@@ -127,16 +128,16 @@ double HandleBounds::beyond(const Pin& pin, const Vec3& normal, double offset, c
   return offset - normal.dot(pin.target) - longer * along;
 }
 
-Vec3 HandleBounds::turned(Vec3 arm, bool over) const {
-  if (over) arm[state_.problem.mirror->axis] *= -1.0;
+Vec3 HandleBounds::reflected(Vec3 arm, bool mirrored) const {
+  if (mirrored) arm[state_.problem.mirror->axis] *= -1.0;
   return arm;
 }
 
-HandleBounds::Place HandleBounds::place_of(Index row, bool over) const {
+HandleBounds::Place HandleBounds::place_of(Index row, bool mirrored) const {
   Index sample = state_.contact.sample_of(row);
-  if (over) sample = mirrored(state_)[static_cast<std::size_t>(sample)];
-  return {turned(state_.contact.found().places.row(row), over),
-          pins_.empty() ? Vec3(Vec3::Zero()) : turned(places_.row(row), over),
+  if (mirrored) sample = mirror_samples(state_)[static_cast<std::size_t>(sample)];
+  return {reflected(state_.contact.found().places.row(row), mirrored),
+          pins_.empty() ? Vec3(Vec3::Zero()) : reflected(places_.row(row), mirrored),
           holders_[static_cast<std::size_t>(sample)]};
 }
 
@@ -144,22 +145,22 @@ Vec3 HandleBounds::target_of(const Place& place) const {
   return affine_image(place.rest.transpose(), motions_[static_cast<std::size_t>(place.holder)]).row(0);
 }
 
-void HandleBounds::bind(const ContactPlane& plane, bool over) {
-  const Vec3 normal = turned(plane.normal, over);
-  const Place first = place_of(plane.first, over);
-  if (plane.second < 0) return bind_to_surface(plane, normal, first, over);
-  bind_to_itself(plane, normal, first, place_of(plane.second, over));
+void HandleBounds::bind(const ContactPlane& plane, bool mirrored) {
+  const Vec3 normal = reflected(plane.normal, mirrored);
+  const Place first = place_of(plane.first, mirrored);
+  if (plane.second < 0) return bind_to_surface(plane, normal, first, mirrored);
+  bind_to_itself(plane, normal, first, place_of(plane.second, mirrored));
 }
 
 void HandleBounds::bind_to_surface(const ContactPlane& plane, const Vec3& normal, const Place& place,
-                                   bool over) {
+                                   bool mirrored) {
   for (const Pin& pin : pins_)
-    if (const double depth = beyond(pin, normal, plane.offset, place); depth > -pin.width)
+    if (const double depth = depth_of(pin, normal, plane.offset, place); depth > -pin.width)
       bounds_of(pin.handle).push_back({normal, depth, plane.obstacle});
   if (place.holder < 0) return;
   const Vec3 target = target_of(place);
   bounds_of(place.holder)
-      .push_back({normal, plane.offset - normal.dot(target), plane.obstacle, target, over});
+      .push_back({normal, plane.offset - normal.dot(target), plane.obstacle, target, mirrored});
 }
 
 /// Splits the constraint on two handles that meet in inverse proportion to their weights.
@@ -172,49 +173,50 @@ void HandleBounds::bind_to_itself(const ContactPlane& plane, const Vec3& normal,
   bounds_of(second.holder).push_back({-normal, (1.0 - own) * depth, plane.obstacle});
 }
 
-/// The least translation within bounds, a quadratic program, by Hildreth's method (1957); `pushes` are its
-/// multipliers.
-std::pair<Vec3, Index> HandleBounds::within(const std::vector<Bound>& bounds) {
-  Vec3 way = Vec3::Zero();
-  std::vector<double> pushes(bounds.size(), 0.0);
+/// The least translation within bounds, a quadratic program, by Hildreth's method (1957).
+std::pair<Vec3, Index> HandleBounds::solve(const std::vector<Bound>& bounds) {
+  Vec3 translation = Vec3::Zero();
+  std::vector<double> multipliers(bounds.size(), 0.0);
   double change = settled;
   for (int sweep = 0; sweep < most_sweeps && change >= settled; ++sweep) {
     change = 0.0;
     for (std::size_t k = 0; k < bounds.size(); ++k) {
-      const double next = std::max(0.0, pushes[k] + bounds[k].depth - bounds[k].normal.dot(way));
-      way += (next - pushes[k]) * bounds[k].normal;
-      change = std::max(change, std::abs(next - pushes[k]));
-      pushes[k] = next;
+      const double next = std::max(0.0, multipliers[k] + bounds[k].depth - bounds[k].normal.dot(translation));
+      translation += (next - multipliers[k]) * bounds[k].normal;
+      change = std::max(change, std::abs(next - multipliers[k]));
+      multipliers[k] = next;
     }
   }
-  const auto most = std::max_element(pushes.begin(), pushes.end());
-  return {way, most == pushes.end() || *most == 0.0
-                   ? -1
-                   : bounds[static_cast<std::size_t>(most - pushes.begin())].surface};
+  const auto most = std::max_element(multipliers.begin(), multipliers.end());
+  return {translation, most == multipliers.end() || *most == 0.0
+                           ? -1
+                           : bounds[static_cast<std::size_t>(most - multipliers.begin())].surface};
 }
 
 /// Linearises the bounds of curved solids anew at the translated points. Returns whether any was changed.
-bool HandleBounds::turn(std::vector<Bound>& bounds, const Vec3& way) const {
+bool HandleBounds::linearise_anew(std::vector<Bound>& bounds, const Vec3& translation) const {
   const RadialState& s = state_;
   bool any = false;
   for (Index k = 0; k < std::ssize(s.contact.surfaces()); ++k) {
     const BarrierSurface& surface = s.contact.surfaces()[static_cast<std::size_t>(k)];
-    if (surface.is_flat() || surface.is_sheet()) continue;
+    if (surface.is_ground() || surface.is_sheet()) continue;
     std::vector<Bound*> of;
     for (Bound& bound : bounds)
-      if (bound.surface == k && bound.target && bound.normal.dot(way) - bound.depth < near_bound)
+      if (bound.surface == k && bound.target && bound.normal.dot(translation) - bound.depth < near_bound)
         of.push_back(&bound);
     if (of.empty()) continue;
     Points places(std::ssize(of), 3);
     for (std::size_t m = 0; m < of.size(); ++m)
-      places.row(static_cast<Index>(m)) = turned(*of[m]->target + way, of[m]->over).transpose();
+      places.row(static_cast<Index>(m)) =
+          reflected(*of[m]->target + translation, of[m]->mirrored).transpose();
     const BarrierSurface::Nearest there = surface.nearest(places);
     for (std::size_t m = 0; m < of.size(); ++m) {
       const auto row = static_cast<Index>(m);
-      const Vec3 normal = turned(there.normals.row(row).transpose(), of[m]->over);
+      const Vec3 normal = reflected(there.normals.row(row).transpose(), of[m]->mirrored);
       if (normal.dot(of[m]->normal) < same_side) continue;
       of[m]->normal = normal;
-      of[m]->depth = normal.dot(way) - there.distances[row] + surface.margin() + ContactTerms::kept;
+      of[m]->depth =
+          normal.dot(translation) - there.distances[row] + surface.margin() + ContactTerms::safety_distance;
       any = true;
     }
   }
@@ -223,13 +225,13 @@ bool HandleBounds::turn(std::vector<Bound>& bounds, const Vec3& way) const {
 
 std::pair<Vec3, Index> HandleBounds::least_translation(Index handle) {
   std::vector<Bound>& bounds = bounds_of(handle);
-  auto [way, surface] = within(bounds);
-  for (int turns = 0; surface >= 0 && turns < most_turns && turn(bounds, way); ++turns) {
-    const Vec3 last = way;
-    std::tie(way, surface) = within(bounds);
-    if ((way - last).norm() < turned_enough) break;
+  auto [translation, surface] = solve(bounds);
+  for (int times = 0; surface >= 0 && times < most_times && linearise_anew(bounds, translation); ++times) {
+    const Vec3 last = translation;
+    std::tie(translation, surface) = solve(bounds);
+    if ((translation - last).norm() < unchanged) break;
   }
-  return {way, surface};
+  return {translation, surface};
 }
 
 }  // namespace arapfields

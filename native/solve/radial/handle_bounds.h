@@ -24,7 +24,7 @@ class HandleBounds {
     double depth;
     Index surface;
     std::optional<Vec3> target = std::nullopt;  ///< the point's position under the motion; none: fixed normal
-    bool over = false;                          ///< of the plane's reflection (symmetric fields)
+    bool mirrored = false;                      ///< of the plane's reflection (symmetric fields)
   };
   /// A point handle. The shape between it and the contact planes below keeps its width.
   struct Pin {
@@ -41,17 +41,17 @@ class HandleBounds {
     Index holder;
   };
 
-  static std::pair<Vec3, Index> within(const std::vector<Bound>& bounds);
-  static double beyond(const Pin& pin, const Vec3& normal, double offset, const Place& place);
+  static std::pair<Vec3, Index> solve(const std::vector<Bound>& bounds);
+  static double depth_of(const Pin& pin, const Vec3& normal, double offset, const Place& place);
   std::vector<Pin> pins() const;
-  Vec3 turned(Vec3 arm, bool over) const;
-  Place place_of(Index row, bool over) const;
+  Vec3 reflected(Vec3 arm, bool mirrored) const;
+  Place place_of(Index row, bool mirrored) const;
   Vec3 target_of(const Place& place) const;
-  void bind(const ContactPlane& plane, bool over);
-  void bind_to_surface(const ContactPlane& plane, const Vec3& normal, const Place& place, bool over);
+  void bind(const ContactPlane& plane, bool mirrored);
+  void bind_to_surface(const ContactPlane& plane, const Vec3& normal, const Place& place, bool mirrored);
   void bind_to_itself(const ContactPlane& plane, const Vec3& normal, const Place& first, const Place& second);
   std::vector<Bound>& bounds_of(Index handle) { return bounds_[static_cast<std::size_t>(handle)]; }
-  bool turn(std::vector<Bound>& bounds, const Vec3& way) const;
+  bool linearise_anew(std::vector<Bound>& bounds, const Vec3& translation) const;
 
   RadialState& state_;
   const std::vector<Mat4>& motions_;

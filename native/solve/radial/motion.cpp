@@ -92,14 +92,14 @@ void TimeIntegrator::integrate(const Progress& progress) {
     if (state_.contact.any()) {
       state_.contact.move_obstacles(share(1.0));
       state_.contact.find(state_.shape.coefficients, 2.0 * h_ * state_.contact.fastest(body_.velocities));
-      state_.contact.grip();
+      state_.contact.add_friction();
     }
     const auto integrated = [&](const TimeScheme& scheme) {
       if (state_.contact.any()) state_.objective(state_.fast);
       set_reachable_targets(state_, motions_between(state_.handles.bound(), before_, share(scheme.w)), false);
       return integrate_step(scheme, progress.part(share(0.0), share(1.0)));
     };
-    const bool touches = state_.contact.found().touching() > 0.0;
+    const bool touches = state_.contact.found().contact_area() > 0.0;
     if (touches || !integrated(body_.accelerations.size() > 0 ? usual : TimeScheme::midpoint()))
       integrated(TimeScheme::backward_euler());
   }
@@ -138,7 +138,7 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
                   share * state_.report.kinetic + motion_floor},
                  progress);
   for (Index round = 0; scheme == TimeScheme::backward_euler() && round < contact_rounds; ++round) {
-    const bool settled = press_contact(state_) < unsettled;
+    const bool settled = update_pressures(state_) < unsettled;
     if (settled && !is_deep(state_)) break;
     stiffen_contact(state_);
     state_.descend(
@@ -221,14 +221,14 @@ void RadialSolver::set_secondary_motion(const std::optional<SecondaryMotion>& mo
   s.dynamics.set(motion);
   std::optional<Ground> ground;
   if (s.dynamics.has_mass() && motion->ground) ground = Ground{*motion->ground, motion->up};
-  if (s.contact.set_further_ground(ground)) s.contact.begin(s.shape.coefficients);
+  if (s.contact.set_second_ground(ground)) s.contact.begin(s.shape.coefficients);
 }
 
 MotionState RadialSolver::motion_state() const {
   const RadialState& s = *state_;
   RowMatrix<double> velocities = s.dynamics.velocities;
   if (velocities.size() == 0) velocities.setZero(s.problem.basis.size(), 3);
-  return {s.shape.coefficients, velocities, s.dynamics.accelerations, s.dynamics.motions, s.contact.held()};
+  return {s.shape.coefficients, velocities, s.dynamics.accelerations, s.dynamics.motions, s.contact.state()};
 }
 
 void RadialSolver::set_motion_state(const MotionState& state) {
@@ -269,7 +269,7 @@ std::shared_ptr<RadialField> RadialSolver::step(const std::vector<Handle>& moved
     set_targets(moved);
     change_coordinates(s, coordinates);
     const ThreadScope threads(s.problem.solve_threads());
-    if (s.contact.any()) s.contact.resume(s.contact.held(), s.shape.coefficients);
+    if (s.contact.any()) s.contact.resume(s.contact.state(), s.shape.coefficients);
     TimeIntegrator(s, seconds).integrate(progress);
   } catch (...) {
     set_targets(handles_before);

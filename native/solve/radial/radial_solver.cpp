@@ -158,10 +158,11 @@ Index RadialSolver::follow(Index iterations, double tolerance, const Progress& p
     ContactSolve(s, iterations, std::max(tolerance, single_tolerance), freely, progress).follow();
   else
     freely(iterations);
-  if (!s.handles.any() && s.hooks.energies.empty() && !s.contact.presses()) anchor_lowest_point(s);
+  if (!s.handles.any() && s.hooks.energies.empty() && !s.contact.has_planes()) anchor_lowest_point(s);
   s.contact.end_at(s.shape.revision);
   s.report.contact.crossing.clear();
-  for (const Index k : s.contact.crossing()) s.report.contact.crossing.push_back(s.contact.name_of(k));
+  for (const Index k : s.contact.crossing_surfaces())
+    s.report.contact.crossing.push_back(s.contact.name_of(k));
   s.dynamics.zero_velocity(motions_of(s.handles.bound()));
   s.report.kinetic = s.report.speed = 0.0;
   s.unmeasured = is_exact ? RadialState::Unmeasured::exact : RadialState::Unmeasured::fast;

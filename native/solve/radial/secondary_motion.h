@@ -30,8 +30,8 @@ struct ContactState {
   struct Inside {
     Index row;
     Index surface;
-    Vec3 seen;
-    double clear;  ///< distance at `seen`; −∞: left inside, where an obstacle crosses the surface
+    Vec3 outside;
+    double clearance;  ///< distance at `outside`; −∞: left inside, where an obstacle crosses the surface
   };
   std::vector<Inside> inside;  ///< last outside positions of points that may be inside
   /// For each surface, whether it crosses the shape at or beside each sample; empty: nowhere.

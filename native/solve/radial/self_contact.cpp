@@ -56,7 +56,8 @@ std::vector<Index> blocks_of(const std::vector<Index>& rows) {
 
 }  // namespace
 
-SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>& rows, double kept) {
+SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>& rows,
+                         double safety_distance) {
   const SurfaceSamples& samples = problem.samples;
   require(samples.normals.rows() == samples.size(), "itself", "samples without normals",
           "normals are needed");
@@ -79,54 +80,55 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
   runs_.emplace(std::move(rest), far_inside);
   const PointGrid grid(places, near_at_rest);  // a cell holds about near_at_rest² of the surface's area
   const double share = static_cast<double>(grid.size()) / static_cast<double>(n);
-  aside_ = spacings_aside * near_at_rest * std::sqrt(share);
-  kept_ = kept;
+  most_offset_ = spacings_aside * near_at_rest * std::sqrt(share);
+  safety_distance_ = safety_distance;
   for (Index i = 0; i < n; i += std::max<Index>(1, n / most_probes)) probes_.push_back(i);
   measure_rest(places);
-  least_ = Vector::Constant(n, kept);
-  Vector at_rest = least_;
-  for (const FacingPair& pair : search(places, [&](auto*) { return normals; }, near_at_rest, Beyond::at_rest))
+  least_gaps_ = Vector::Constant(n, safety_distance);
+  Vector at_rest = least_gaps_;
+  for (const FacingPair& pair :
+       search(places, [&](auto*) { return normals; }, near_at_rest, Penetrations::at_rest))
     for (const Index i : {pair.first, pair.second})
       at_rest[i] = std::min(at_rest[i], std::max(0.0, pair.gap));
-  least_ = (above_.array() > inside).select(0.0, at_rest);
+  least_gaps_ = (windings_above_.array() > inside).select(0.0, at_rest);
   begin(places, [&](auto*) { return normals; });
 }
 
 /// Scales the winding numbers to a jump of 1 across the surface, and computes those at rest.
 void SelfContact::measure_rest(PointsIn places) {
-  const SampleWindings at_rest(places, normals_, aside_);
-  above_.resize(places.rows());
-  parallel_for(0, above_.size(), 64, [&](Index first, Index last) {
-    for (Index i = first; i < last; ++i) above_[i] = winding(at_rest, i, outwards, places, normals_);
+  const SampleWindings at_rest(places, normals_, most_offset_);
+  windings_above_.resize(places.rows());
+  parallel_for(0, windings_above_.size(), 64, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) windings_above_[i] = winding(at_rest, i, outwards, places, normals_);
   });
-  below_ = below(at_rest, places, normals_);
-  Vector jumps = below_ - above_(probes_);
+  windings_below_ = windings_below(at_rest, places, normals_);
+  Vector jumps = windings_below_ - windings_above_(probes_);
   const Index half = jumps.size() / 2;
   std::nth_element(jumps.begin(), jumps.begin() + half, jumps.end());
-  share_ = 1.0 / std::max(jumps[half], 1e-12);  // the median jump becomes 1
-  below_ *= share_;
-  above_ *= share_;
-  is_cut_ = below_.maxCoeff() > 1.0 + inside_another;
+  winding_scale_ = 1.0 / std::max(jumps[half], 1e-12);  // the median jump becomes 1
+  windings_below_ *= winding_scale_;
+  windings_above_ *= winding_scale_;
+  is_cut_ = windings_below_.maxCoeff() > 1.0 + inside_another;
   if (is_cut_) find_cuts(places);
 }
 
 /// Finds for each sample the nearest one inside another part at rest, and drops the probes near such samples.
 void SelfContact::find_cuts(PointsIn places) {
   std::vector<Index> within, kept;
-  for (Index i = 0; i < above_.size(); ++i)
-    if (above_[i] > inside) within.push_back(i);
+  for (Index i = 0; i < windings_above_.size(); ++i)
+    if (windings_above_[i] > inside) within.push_back(i);
   if (within.empty()) return;
   const auto alike = [](const Points& points) -> Points { return Points::Zero(points.rows(), 3); };
   const Points cuts = rows_of(places, within);
   cuts_ = rows_of(cuts, OrientedPoints(cuts, alike(cuts)).nearest(places, alike(places), 0.0));
   std::vector<Index> probes;
-  for (Index k = 0; k < below_.size(); ++k) {
+  for (Index k = 0; k < windings_below_.size(); ++k) {
     const Index i = probes_[static_cast<std::size_t>(k)];
     if ((places.row(i) - cuts_.row(i)).norm() < near_a_cut) continue;
     kept.push_back(k);
     probes.push_back(i);
   }
-  below_ = entries_of(below_, kept);
+  windings_below_ = entries_of(windings_below_, kept);
   probes_ = std::move(probes);
 }
 
@@ -143,7 +145,7 @@ bool SelfContact::is_cut(Index i, Index j) const {
   const auto at = [&](Index k) { return inside_.row(k).leftCols<3>(); };
   const Vec3 arm = (at(i) - at(j)).transpose();
   if (arm.squaredNorm() < near_a_cut * near_a_cut &&
-      std::min(normals_.row(j).dot(arm), -normals_.row(i).dot(arm)) < kept_)
+      std::min(normals_.row(j).dot(arm), -normals_.row(i).dot(arm)) < safety_distance_)
     return true;
   return cuts_.rows() > 0 && (at(i) - cuts_.row(i)).norm() + (cuts_.row(i) - cuts_.row(j)).norm() +
                                      (cuts_.row(j) - at(j)).norm() <
@@ -153,24 +155,24 @@ bool SelfContact::is_cut(Index i, Index j) const {
 /// Whether sample i, behind sample j's tangent plane, has passed through it: at the last search i was paired
 /// with the same part, or in front of j.
 bool SelfContact::came_through(Index i, Index j, const Vec3& normal) const {
-  const Index before = ways_.faced[static_cast<std::size_t>(i)];
+  const Index before = last_search_.faced[static_cast<std::size_t>(i)];
   return (before >= 0 && !is_far(before, j, far_inside)) ||
-         (ways_.seen.row(i) - ways_.seen.row(j)).dot(normal.transpose()) >= 0.0;
+         (last_search_.places.row(i) - last_search_.places.row(j)).dot(normal.transpose()) >= 0.0;
 }
 
 /// Whether a pair of samples is not excluded.
 bool SelfContact::may_meet(Index i, Index j) const {
-  return least_[i] > 0.0 && least_[j] > 0.0 && is_far(i, j, far_inside) && !is_cut(i, j);
+  return least_gaps_[i] > 0.0 && least_gaps_[j] > 0.0 && is_far(i, j, far_inside) && !is_cut(i, j);
 }
 
 /// Whether a gap along the normal of sample j makes a pair.
-bool SelfContact::is_gap(double gap, Index i, Index j, const Vec3& normal, Beyond beyond) const {
-  switch (beyond) {
-    case Beyond::none:
+bool SelfContact::is_gap(double gap, Index i, Index j, const Vec3& normal, Penetrations penetrations) const {
+  switch (penetrations) {
+    case Penetrations::none:
       return gap >= 0.0;
-    case Beyond::as_came:
+    case Penetrations::as_came:
       return gap >= 0.0 || came_through(i, j, normal);
-    case Beyond::shallow:
+    case Penetrations::shallow:
       return gap >= -shallow;
     default:
       return true;
@@ -179,8 +181,8 @@ bool SelfContact::is_gap(double gap, Index i, Index j, const Vec3& normal, Beyon
 
 /// The nearest sample within `near` that sample i faces, out of these runs; −1: none.
 Index SelfContact::faced_by(Index i, const std::vector<Index>& runs, PointsIn places, const Points& normals,
-                            double near, Beyond beyond) const {
-  if (least_[i] <= 0.0) return -1;
+                            double near, Penetrations penetrations) const {
+  if (least_gaps_[i] <= 0.0) return -1;
   const Vec3 place = places.row(i).transpose(), normal = normals.row(i).transpose();
   Index faced = -1;
   double nearest = near * near;
@@ -192,8 +194,9 @@ Index SelfContact::faced_by(Index i, const std::vector<Index>& runs, PointsIn pl
       const Vec3 other = normals.row(j).transpose();
       if (normal.dot(other) > facing || !may_meet(i, j)) continue;
       const double gap = arm.dot(other);
-      if (square - gap * gap > aside_ * aside_ || -gap > std::min(widths_[i], widths_[j])) continue;
-      if (!is_gap(gap, i, j, other, beyond)) continue;
+      if (square - gap * gap > most_offset_ * most_offset_ || -gap > std::min(widths_[i], widths_[j]))
+        continue;
+      if (!is_gap(gap, i, j, other, penetrations)) continue;
       nearest = square;
       faced = j;
     }
@@ -201,12 +204,12 @@ Index SelfContact::faced_by(Index i, const std::vector<Index>& runs, PointsIn pl
 }
 
 std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& normals_at, double near,
-                                            Beyond beyond) {
+                                            Penetrations penetrations) {
   Points areas;  // all normals at once if the last search needed them for winding numbers
-  if (std::exchange(is_beyond_, false)) areas = normals_at(nullptr);
+  if (std::exchange(penetrates_, false)) areas = normals_at(nullptr);
   Points normals = unit_rows(areas);
   const std::vector<std::vector<Index>> near_to =
-      runs_->meeting(places, normals, least_.array() > 0.0, near, facing);
+      runs_->meeting(places, normals, least_gaps_.array() > 0.0, near, facing);
   std::vector<Index> runs, samples;
   for (Index run = 0; run < runs_->count(); ++run) {
     if (near_to[static_cast<std::size_t>(run)].empty()) continue;
@@ -221,7 +224,7 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
     for (const Index i : samples) normals.row(i).normalize();
   }
   std::vector<Index> faced(static_cast<std::size_t>(places.rows()), -1);
-  const auto look = [&](Beyond which, const auto& wanted) {
+  const auto look = [&](Penetrations which, const auto& wanted) {
     parallel_for(0, std::ssize(runs), 32, [&](Index first, Index last) {
       for (Index k = first; k < last; ++k) {
         const Index run = runs[static_cast<std::size_t>(k)];
@@ -232,17 +235,18 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
       }
     });
   };
-  look(beyond, [](Index) { return true; });
-  const auto is_beyond = [&](Index i) {
+  look(penetrations, [](Index) { return true; });
+  const auto penetrates = [&](Index i) {
     const Index j = faced[static_cast<std::size_t>(i)];
     return j >= 0 && normals.row(j).dot(places.row(i) - places.row(j)) < 0.0;
   };
-  is_beyond_ = beyond != Beyond::at_rest && std::any_of(samples.begin(), samples.end(), is_beyond);
-  if (is_beyond_) {
+  penetrates_ =
+      penetrations != Penetrations::at_rest && std::any_of(samples.begin(), samples.end(), penetrates);
+  if (penetrates_) {
     if (areas.rows() == 0) areas = normals_at(nullptr);
-    const SampleWindings now(places, share_ * areas, aside_);
-    look(Beyond::none, [&](Index i) {  // outside by its winding number: opposite sides of one thin part
-      return is_beyond(i) && winding(now, i, outwards, places, areas) - above_[i] < entered;
+    const SampleWindings now(places, winding_scale_ * areas, most_offset_);
+    look(Penetrations::none, [&](Index i) {  // outside by its winding number: opposite sides of one thin part
+      return penetrates(i) && winding(now, i, outwards, places, areas) - windings_above_[i] < entered;
     });
   }
   std::vector<FacingPair> pairs;
@@ -251,7 +255,7 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
     if (j < 0) continue;
     const Vec3 normal = normals.row(j).transpose();
     pairs.push_back({i, j, normal, normal.dot((places.row(i) - places.row(j)).transpose()),
-                     std::min(least_[i], least_[j])});
+                     std::min(least_gaps_[i], least_gaps_[j])});
   }
   return pairs;
 }
@@ -259,12 +263,12 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
 /// The winding number at a small offset from a sample along its normal, outwards or inwards by `side`.
 double SelfContact::winding(const SampleWindings& windings, Index i, double side, PointsIn places,
                             PointsIn normals) const {
-  const double way = side * std::min(aside_, 0.5 * widths_[i]);
-  return windings.at((places.row(i) + way * normals.row(i).normalized()).transpose());
+  const double offset = side * std::min(most_offset_, 0.5 * widths_[i]);
+  return windings.at((places.row(i) + offset * normals.row(i).normalized()).transpose());
 }
 
 /// Winding numbers at the inward offsets of the probes.
-Vector SelfContact::below(const SampleWindings& windings, PointsIn places, PointsIn normals) const {
+Vector SelfContact::windings_below(const SampleWindings& windings, PointsIn places, PointsIn normals) const {
   Vector result(std::ssize(probes_));
   for (Index k = 0; k < result.size(); ++k)
     result[k] = winding(windings, probes_[static_cast<std::size_t>(k)], inwards, places, normals);
@@ -272,22 +276,24 @@ Vector SelfContact::below(const SampleWindings& windings, PointsIn places, Point
 }
 
 bool SelfContact::overlaps(PointsIn places, PointsIn normals) const {
-  const SampleWindings now(places, share_ * normals, aside_);
-  return !probes_.empty() && (below(now, places, normals) - below_).maxCoeff() > inside_another;
+  const SampleWindings now(places, winding_scale_ * normals, most_offset_);
+  return !probes_.empty() &&
+         (windings_below(now, places, normals) - windings_below_).maxCoeff() > inside_another;
 }
 
 void SelfContact::remember(PointsIn places, const std::vector<FacingPair>& pairs) {
-  ways_.seen = places;
-  ways_.faced.assign(static_cast<std::size_t>(places.rows()), -1);
-  for (const FacingPair& pair : pairs) ways_.faced[static_cast<std::size_t>(pair.first)] = pair.second;
+  last_search_.places = places;
+  last_search_.faced.assign(static_cast<std::size_t>(places.rows()), -1);
+  for (const FacingPair& pair : pairs) last_search_.faced[static_cast<std::size_t>(pair.first)] = pair.second;
 }
 
 void SelfContact::begin(PointsIn places, const Normals& normals) {
-  remember(places, search(places, normals, near_at_rest, Beyond::shallow));
+  remember(places, search(places, normals, near_at_rest, Penetrations::shallow));
 }
 
 std::vector<FacingPair> SelfContact::find(PointsIn places, const Normals& normals, double near, bool jumped) {
-  std::vector<FacingPair> pairs = search(places, normals, near, jumped ? Beyond::all : Beyond::as_came);
+  std::vector<FacingPair> pairs =
+      search(places, normals, near, jumped ? Penetrations::all : Penetrations::as_came);
   remember(places, pairs);
   return pairs;
 }

@@ -27,15 +27,15 @@ struct FacingPair {
 class SelfContact {
  public:
   /// The state of the last search.
-  struct Ways {
-    Points seen;               ///< (n,3) positions
+  struct Search {
+    Points places;             ///< (n,3) positions
     std::vector<Index> faced;  ///< second sample of each one's pair; −1: none
   };
   /// Deformed normals (n,3), scaled by the area ratio, in these blocks of a RadialEvaluator; null: in all.
   using Normals = std::function<Points(const std::vector<Index>* blocks)>;
-  /// For these rows of the problem's samples, with a safety distance `kept`, in cube units. Throws
-  /// InvalidInput without normals.
-  SelfContact(const RadialProblem& problem, const std::vector<Index>& rows, double kept);
+  /// For these rows of the problem's samples; the distance is in cube units. Throws InvalidInput without
+  /// normals.
+  SelfContact(const RadialProblem& problem, const std::vector<Index>& rows, double safety_distance);
 
   /// Pairs each sample with the nearest one that it faces within `near`, in cube units, at places (n,3).
   /// `normals` is called only if parts are near each other. `jumped`: the last search says nothing of how the
@@ -43,45 +43,46 @@ class SelfContact {
   std::vector<FacingPair> find(PointsIn places, const Normals& normals, double near, bool jumped = false);
   /// Whether a part is inside another one, however deep, that it is outside of at rest (by winding numbers).
   bool overlaps(PointsIn places, PointsIn normals) const;
-  const Ways& ways() const { return ways_; }
-  void set_ways(Ways ways) { ways_ = std::move(ways); }
+  const Search& last_search() const { return last_search_; }
+  void set_last_search(Search search) { last_search_ = std::move(search); }
   /// Starts at a solved shape: as the last search, but only shallow negative gaps count.
   void begin(PointsIn places, const Normals& normals);
 
  private:
   /// Which negative gaps (penetrations) count as pairs; at_rest is `all` without the test of winding numbers.
-  enum class Beyond { none, as_came, shallow, all, at_rest };
-  std::vector<FacingPair> search(PointsIn places, const Normals& normals, double near, Beyond beyond);
+  enum class Penetrations { none, as_came, shallow, all, at_rest };
+  std::vector<FacingPair> search(PointsIn places, const Normals& normals, double near,
+                                 Penetrations penetrations);
   bool is_far(Index i, Index j, double distance) const;
   bool is_cut(Index i, Index j) const;
   bool may_meet(Index i, Index j) const;
   bool came_through(Index i, Index j, const Vec3& normal) const;
-  bool is_gap(double gap, Index i, Index j, const Vec3& normal, Beyond beyond) const;
+  bool is_gap(double gap, Index i, Index j, const Vec3& normal, Penetrations penetrations) const;
   Index faced_by(Index i, const std::vector<Index>& runs, PointsIn places, const Points& normals, double near,
-                 Beyond beyond) const;
+                 Penetrations penetrations) const;
   double winding(const SampleWindings& windings, Index i, double side, PointsIn places,
                  PointsIn normals) const;
-  Vector below(const SampleWindings& windings, PointsIn places, PointsIn normals) const;
+  Vector windings_below(const SampleWindings& windings, PointsIn places, PointsIn normals) const;
   void measure_rest(PointsIn places);
   void find_cuts(PointsIn places);
   void remember(PointsIn places, const std::vector<FacingPair>& pairs);
 
   RowMatrix<double> inside_;  // (n,6) rest positions and their interior embedding
   Points normals_;            // (n,3) at rest
-  double kept_ = 0.0;
+  double safety_distance_ = 0.0;
   bool is_cut_ = false;  // whether parts intersect at rest
   std::optional<FacingRuns> runs_;
   std::vector<std::int32_t> meshes_;
-  Points cuts_;                // (n,3) nearest rest position of a sample inside another part; empty: none
-  std::vector<Index> probes_;  // samples below which winding numbers are evaluated
-  Vector below_;               // winding numbers below the probes at rest
-  Vector above_;               // (n) winding numbers above the samples at rest
-  double share_ = 1.0;         // scale for which winding numbers jump by 1 across the surface
-  Vector widths_;              // (n) local width of the shape: twice its thickness
-  Vector least_;               // (n) gaps at rest, at most kept_; 0: excluded
-  double aside_ = 0.0;         // largest tangential offset of a pair, in cube units
-  Ways ways_;
-  bool is_beyond_ = false;  // whether a gap was negative at the last search
+  Points cuts_;                 // (n,3) nearest rest position of a sample inside another part; empty: none
+  std::vector<Index> probes_;   // samples below which winding numbers are evaluated
+  Vector windings_below_;       // winding numbers below the probes at rest
+  Vector windings_above_;       // (n) winding numbers above the samples at rest
+  double winding_scale_ = 1.0;  // scale for which winding numbers jump by 1 across the surface
+  Vector widths_;               // (n) local width of the shape: twice its thickness
+  Vector least_gaps_;           // (n) gaps at rest, at most safety_distance_; 0: excluded
+  double most_offset_ = 0.0;    // largest tangential offset of a pair, in cube units
+  Search last_search_;
+  bool penetrates_ = false;  // whether a gap was negative at the last search
 };
 
 }  // namespace arapfields

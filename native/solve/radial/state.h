@@ -82,7 +82,7 @@ struct RadialState {
   /// Discards warm-start data, so that the next solve depends on the coefficients alone.
   void invalidate_history();
   std::array<Revision, 4> start_revisions() const {
-    return {problem.energy_revision, preconditioner.revision, shape.jumps, contact.presses()};
+    return {problem.energy_revision, preconditioner.revision, shape.jumps, contact.has_planes()};
   }
 
   RadialProblem problem;

@@ -23,35 +23,36 @@ struct ContactSet {
   static constexpr double deep = 5e-4;    ///< tolerance of the depth beyond a margin, in cube units
 
   /// The fraction of the area in contact: where pressures are positive.
-  double touching() const;
+  double contact_area() const;
   /// Mean contact force of each surface, (surfaces, 3), near a place; the weights fall off with the distance.
   Points forces_at(const Vec3& place, const double* now, Index surfaces) const;
-  /// Adapts the stiffness to the mean pressure; raises it if `more`, else lowers it gradually.
-  void harden(bool more);
+  /// Adapts the stiffness to the mean pressure; raises it if `raise`, else lowers it gradually.
+  void adapt_stiffness(bool raise);
 };
 
 /// The sides of each surface that contact points are on: their last positions outside it, and friction's
-/// anchors. `seen` and `anchors` move with the surface.
-struct ContactWays {
-  /// Value of `clear` for points inside an obstacle that crosses the surface: they are not pushed out.
+/// anchors. `outside` and `anchors` move with the surface.
+struct ContactSides {
+  /// Value of `clearance` for points inside an obstacle that crosses the surface: they are not pushed out.
   static constexpr double left_inside = -std::numeric_limits<double>::infinity();
 
-  std::vector<Points> seen;                ///< last position of each point known to be outside
+  std::vector<Points> outside;             ///< last position of each point known to be outside
   std::vector<Points> anchors;             ///< anchors of friction
-  RowMatrix<double> clear;                 ///< (points, surfaces) signed distance at `seen`
+  RowMatrix<double> clearance;             ///< (points, surfaces) signed distance at `outside`
   std::vector<std::vector<bool>> crossed;  ///< samples at or beside an intersection; empty: none
-  SelfContact::Ways own;
+  SelfContact::Search itself;
 
   /// Finds where the obstacle crosses the deforming surface; points inside it there are left_inside.
-  void cross(Index surface, const BarrierSurface& obstacle, const ContactPoints& points, PointsIn places);
+  void find_crossings(Index surface, const BarrierSurface& obstacle, const ContactPoints& points,
+                      PointsIn places);
   /// Obstacles with points that are left_inside.
-  std::vector<Index> crossing() const;
+  std::vector<Index> crossing_surfaces() const;
   bool crosses(Index surface, Index sample) const {
     const std::vector<bool>& samples = crossed[static_cast<std::size_t>(surface)];
     return !samples.empty() && samples[static_cast<std::size_t>(sample)];
   }
-  /// Applies an obstacle's motion to its `seen` and `anchors`.
-  void carry(Index surface, const Mat4& motion);
+  /// Applies an obstacle's motion to its `outside` and `anchors`.
+  void move_with(Index surface, const Mat4& motion);
   /// Appends points with copies of these rows.
   void add(const std::vector<Index>& like);
   /// Starts the points appended last at their own places, where their samples are `crossed`.
@@ -60,8 +61,8 @@ struct ContactWays {
 };
 
 /// The contact state that a solve can be rolled back to.
-struct ContactPressing {
-  ContactWays ways;
+struct ContactSnapshot {
+  ContactSides sides;
   RowMatrix<double> pressures;
   double stiffness = 0.0;
 };
