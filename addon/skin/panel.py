@@ -33,6 +33,7 @@ class ARAPFIELDS_PT_skin(Section, bpy.types.Panel):
 class ARAPFIELDS_PT_skin_settings(Advanced, bpy.types.Panel):
     bl_label = "Skin Settings"
     bl_order = 4
+    needs_source = False
 
     @classmethod
     def poll(cls, context):

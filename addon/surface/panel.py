@@ -48,6 +48,15 @@ class ARAPFIELDS_PT_advanced(Section, bpy.types.Panel):
     bl_label = "Advanced"
     bl_order = 11
     bl_options = {"DEFAULT_CLOSED"}
+    needs_source = False
+
+    @classmethod
+    def poll(cls, context):
+        active, source = (
+            find(context) for find in (object_references.active_of, object_references.source_of)
+        )
+        is_rig = active is not None and active.type == "ARMATURE"  # with several meshes, to be skinned
+        return super().poll(context) and (source is not None or is_rig)
 
     def fill(self, context, source, settings):
         pass

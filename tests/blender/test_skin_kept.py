@@ -9,6 +9,7 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.baking import cancelled_at, changed_at_work
+    from support.blender.panels import drawn
     from support.blender.skins import person, rest_rig, shirt, weights_of
     from support.blender.stages import Operator
 
@@ -34,6 +35,19 @@ def seen_of(body):
         "keys": [(key.name, [tuple(p.co) for p in key.data]) for key in keys.key_blocks] if keys else [],
         "drivers": [c.driver.expression for c in keys.animation_data.drivers] if keys else [],
     }
+
+
+def test_all_settings_of_a_rig_beside_several_meshes_are_in_reach():
+    body, rig = person()
+    cloth = shirt(body)
+    scenes.activate(body, cloth, rig)
+    texts = drawn()
+    assert {"Influences", "Correctives"} <= {*texts["ARAPFIELDS_PT_skin"]}
+    assert {"Poses", "Seed"} <= {*texts["ARAPFIELDS_PT_skin_settings"]} and "ARAPFIELDS_PT_advanced" in texts
+    assert not [name for name in texts if name.endswith(("PT_surface", "PT_deform_settings", "PT_handles"))]
+    rig.select_set(False)
+    bpy.ops.object.camera_add()
+    assert [name for name in drawn() if "_PT_" in name] == ["ARAPFIELDS_PT_source"]
 
 
 def test_undo_a_file_and_another_armature(tmp_path):
