@@ -12,7 +12,7 @@ class HeldBack(Report):
 
     handle: int
     by: str
-    """"obstacles[0]", say, or "ground"."""
+    """Such as "obstacles[0]" or "ground"."""
     distance: float
     """Mean distance to the target, in mesh units."""
 
@@ -22,9 +22,9 @@ class ContactReport(Report):
     """Contact of a solved surface."""
 
     deepest: float
-    """How far a sample is beyond an obstacle's margin, in mesh units."""
+    """Largest penetration of a sample beyond an obstacle's margin, in mesh units."""
     touching: float
-    """Share of the area that presses."""
+    """Share of the area in contact."""
     held: tuple[HeldBack, ...]
     crossing: tuple[str, ...]
-    """"obstacles[0]", say: an obstacle that crosses the surface at rest; what is inside it stays."""
+    """Obstacles, such as "obstacles[0]", that cross the surface at rest; points inside them stay."""

@@ -42,13 +42,13 @@ class Iteration:
     """The argument of a callback, after each iteration."""
 
     iteration: int
-    """Iterations done, from 1."""
+    """Number of completed iterations, from 1."""
     loss: float
     """The loss estimated in this iteration."""
     terms: Mapping[str, float]
-    """The weighted terms of the loss, whose sum it is; see deform, stylize and fit_sdf for their names."""
+    """The weighted terms, which sum to the loss; see deform, stylize and fit_sdf for their names."""
     seconds: float
-    """Since the iterations began."""
+    """Time since the start of the iterations."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "terms", MappingProxyType(dict(self.terms)))

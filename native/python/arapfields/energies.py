@@ -41,7 +41,7 @@ class EnergyValue(NamedTuple):
     jacobians: ArrayLike | None = None
     """∂value/∂jacobians (n, 3, 3)."""
     hessians: ArrayLike | None = None
-    """∂value/∂hessians (n, 3, 3, 3), each of its numbers taken for a variable of its own."""
+    """∂value/∂hessians (n, 3, 3, 3), all of whose entries are independent variables."""
 
 
 class Energy(ABC):
@@ -53,7 +53,7 @@ class Energy(ABC):
     """
 
     order: int = 1
-    """Highest derivatives that it looks at: 1 or 2, which then has the second derivatives computed."""
+    """Highest order of the derivatives it uses: 1 or 2; second derivatives are computed only for 2."""
 
     @abstractmethod
     def __call__(self, jets: Jets) -> EnergyValue:

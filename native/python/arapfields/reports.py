@@ -27,15 +27,15 @@ class FitReport(Report):
     near_max: float
     """Largest error near the surface."""
     volume_mean: float
-    """Mean error at points spread evenly through the cube."""
+    """Mean error at points uniform in the cube."""
     volume_max: float
-    """Largest error there."""
+    """Largest error at these points."""
     scale: float
-    """Mesh units a cube unit."""
+    """Mesh units per cube unit."""
     iterations: int
     seconds: float
     distance_seconds: float
-    """The part of the seconds spent on exact distances."""
+    """Seconds spent on exact distances."""
     stopped_by: StoppedBy
     device: str
 
@@ -55,13 +55,13 @@ class EnergyReport(Report):
     stretch: float
     """Mean ‖J − R‖²."""
     bend: float
-    """Mean squared speed at which the closest rotation R turns."""
+    """Mean squared derivative of the closest rotation R."""
     energy: float
     """stretch + bending · bend."""
     handle_error_mean: float
     """Mean distance between the handles' samples and their targets, in mesh units."""
     handle_error_max: float
-    """The largest one."""
+    """Largest distance between a sample and its target, in mesh units."""
     min_determinant: float
     """Smallest det J."""
     flipped_share: float
@@ -74,7 +74,7 @@ class EnergyReport(Report):
     seconds: float
     contact: ContactReport
     preference: float | None = None
-    """Mean agreement with the preferred normals, where there are any."""
+    """Mean agreement with the preferred normals, if there are any."""
     notes: tuple[str, ...] = ()
     """Warnings: folds, distant targets, margins that were reduced."""
 
@@ -84,14 +84,14 @@ class SolveReport(EnergyReport):
     """Energies, errors and loss history of deform or stylize."""
 
     scale: float
-    """Mesh units a cube unit."""
+    """Mesh units per cube unit."""
     stopped_by: StoppedBy
     handles: tuple[HandleError, ...]
     """Each handle's errors."""
     loss: tuple[tuple[int, float], ...]
-    """(iteration, loss), at most a few hundred of them."""
+    """(iteration, loss), at most a few hundred pairs."""
     far_target: float | None = None
-    """Distance of the farthest handle's target in sizes of the shape, where it is large."""
+    """Distance of the farthest target divided by the shape's size, if that is large."""
 
     @property
     def out_of_time(self) -> bool:
@@ -104,11 +104,11 @@ class LiveReport(EnergyReport):
     """The last solve or step of a LiveDeformer. `speed`: that of a step, in mesh units per second."""
 
     value: float
-    """The minimised value: all terms."""
+    """The minimised value, the sum of all terms."""
     evaluations: int
     """Number of evaluations of the energy."""
     converged: bool
-    """Whether a further step would gain next to nothing."""
+    """Whether further steps would hardly reduce the value."""
     setup_seconds: float
     kinetic: float = 0.0
     speed: float = 0.0
@@ -119,7 +119,7 @@ class WrapReport(Report):
     """Distances and distortion of a wrap. Distances between surfaces are shares of the target's diagonal."""
 
     to_target_mean: float
-    """Mean distance from the wrapped surface, where it has a counterpart, to the target."""
+    """Mean distance to the target from the parts of the wrapped surface that have a counterpart."""
     to_target_95: float
     """The 95 % quantile of that distance."""
     from_target_mean: float
@@ -127,19 +127,19 @@ class WrapReport(Report):
     from_target_95: float
     """The 95 % quantile of that distance."""
     matched_share: float
-    """Share of the surface that has a counterpart; 1 where the target is closed."""
+    """Share of the surface that has a counterpart; 1 for a closed target."""
     landmarks: tuple[float, ...]
-    """Distance of each landmark to its place on the target, in mesh units."""
+    """Distance of each landmark from its target point, in mesh units."""
     left_out: tuple[int, ...]
-    """Landmarks that contradict the others, by number from 0: the wrap does not follow them."""
+    """Indices of landmarks that contradict the others and are ignored."""
     diagonal: float
-    """Of the target's bounding box, in mesh units."""
+    """Diagonal of the target's bounding box, in mesh units."""
     scale: float
-    """Of the alignment."""
+    """Scale of the alignment."""
     stretch: float
     """Mean ‖J − R‖², without that scale."""
     bend: float
-    """Mean squared speed at which the closest rotation R turns."""
+    """Mean squared derivative of the closest rotation R."""
     min_determinant: float
     """Smallest det J, without the scale."""
     flipped_share: float
@@ -147,7 +147,7 @@ class WrapReport(Report):
     iterations: int
     seconds: float
     notes: tuple[str, ...] = ()
-    """Warnings: unlike shapes, landmarks that do not fit, folds."""
+    """Warnings: shapes that differ much, contradictory landmarks, folds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,10 +167,10 @@ class SampleReport(Report):
     lines: int
     """Random lines cast."""
     evaluations: int
-    """Points at which the function was evaluated, those with gradients included."""
+    """Number of evaluated points, including those with gradients."""
     gradient_evaluations: int
     model_evaluations: int
-    """Points spent before the first line."""
+    """Evaluations before the first line."""
     lipschitz: float
     """The bound on the gradient, given or measured."""
     largest_value: float
@@ -183,20 +183,20 @@ class ExtractionReport(Report):
     """Evaluations and topology of extract_surface."""
 
     evaluations: int
-    """Points at which the function was evaluated, those with gradients included."""
+    """Number of evaluated points, including those with gradients."""
     dense_evaluations: int
-    """Points of the whole grid."""
+    """Number of points of the full grid."""
     open: bool
     """Whether the surface leaves the cube, so that the mesh has a boundary."""
     seconds: float
     pieces: int
-    """Parts of the mesh that share no vertex."""
+    """Number of connected components of the mesh."""
     thin_cells: int
-    """Cells at parts thinner than two cells."""
+    """Number of cells at parts thinner than two cells."""
     refinement: int
-    """Steps into which an edge of these was cut; 1 where none was."""
+    """Number of parts of an edge of these cells; 1 without refinement."""
     holding_resolution: int
-    """A resolution at which fewer pieces come apart; 0 where none was found or nothing came apart."""
+    """A resolution with fewer pieces; 0 if none was found, or nothing came apart."""
     notes: tuple[str, ...]
 
 
@@ -205,9 +205,9 @@ class DeformedExtractionReport(ExtractionReport):
     """Evaluations, inverses and topology of extract_deformed."""
 
     inverted: int
-    """Points whose rest positions were computed."""
+    """Number of points whose rest positions were computed."""
     failures: int
-    """Points without one, where the distance to the moved rest surface is used."""
+    """Points without a rest position, at which the distance to the moved rest surface is used."""
     spacing: float
     """Spacing of the grid, in mesh units."""
 
