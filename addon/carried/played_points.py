@@ -11,7 +11,7 @@ import bpy
 from ..blender import modifier_stack
 from ..blender.removal import remove_mesh_object, remove_node_modifier
 from ..core.errors import UserError
-from ..field_modifier import inputs
+from ..field_modifier import cache_modifier, inputs
 from ..field_modifier.node_group import VECTORS, Graph, kept_group
 from ..names import CACHE_MODIFIER, PLAYED_GROUP, PLAYED_SUFFIX, ROWS
 from .drawings import layers_of
@@ -75,15 +75,8 @@ def play(item, points, counts):
         inputs.put_attribute(modifier, "Mask", inputs.get_attribute(field, "Mask"))
         inputs.put(modifier, "Factor", inputs.get(field, "Factor"))
     item.modifiers.move(len(item.modifiers) - 1, 0)  # hair grown from these follows
-    set_playing(item, True)
+    cache_modifier.set_playing(item, True, find(item))
     return inputs.get(modifier, "Points")
-
-
-def set_playing(item, on):
-    """Shows the bake's modifier and hides the field's, or the reverse."""
-    for modifier, shown in ((find(item), on), (modifier_stack.find(item), not on)):
-        if modifier is not None:
-            modifier.show_viewport = modifier.show_render = shown
 
 
 def remove(item):
@@ -91,7 +84,7 @@ def remove(item):
     modifier = find(item)
     if modifier is None:
         return
-    set_playing(item, False)
+    cache_modifier.set_playing(item, False, modifier)
     played = inputs.get(modifier, "Points")
     remove_node_modifier(modifier)
     if played is not None and played.users == 0:

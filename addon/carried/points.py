@@ -7,7 +7,7 @@ from ..blender import mesh_arrays, modifier_stack
 from ..blender.actions import remove_curves
 from ..blender.removal import remove_node_modifier
 from ..core.errors import UserError
-from ..field_modifier import motion, node_group
+from ..field_modifier import cache_modifier, motion, node_group
 from ..names import FIELD_MODIFIER, OFFSETS, WARP_KEY
 from . import played_points
 from .carriers import Carrier
@@ -37,7 +37,7 @@ class AttributeCarrier(Carrier):
         return np.concatenate(points or [np.zeros((0, 3))]).astype(np.float64)
 
     def bind(self, context, item, entry):
-        played_points.set_playing(item, False)
+        cache_modifier.set_playing(item, False, played_points.find(item))
         if modifier_stack.find(item) is None:
             modifier = item.modifiers.new(FIELD_MODIFIER, "NODES")
             modifier.node_group = node_group.find_or_make()

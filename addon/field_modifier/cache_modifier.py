@@ -50,9 +50,10 @@ def is_playing(source):
     return modifier is not None and modifier.show_viewport
 
 
-def set_playing(source, on):
-    """Shows the bake's modifier and hides the field's, or the reverse."""
-    for modifier, shown in ((modifier_stack.find_cache(source), on), (modifier_stack.find(source), not on)):
+def set_playing(source, on, played=None):
+    """Shows the bake's modifier, `played` or the point cache's, and hides the field's; or the reverse."""
+    played = played or modifier_stack.find_cache(source)
+    for modifier, shown in ((played, on), (modifier_stack.find(source), not on)):
         if modifier is not None:
             modifier.show_viewport = modifier.show_render = shown
 

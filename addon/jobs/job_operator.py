@@ -31,8 +31,7 @@ class JobOperator(ModalRun, Guided):
     @classmethod
     def obstacle(cls, context):
         source = source_of(context)
-        reason = native.problem() or refusal(source) or busy() or mesh_arrays.refusal(source)
-        return reason or cls.refuses(source)
+        return unready(source) or cls.refuses(source)
 
     @classmethod
     def refuses(cls, source):
@@ -172,6 +171,11 @@ def until_edit_mode_ends(job, reference):
     while (item := reference.find()) is not None and item.mode == "EDIT":
         job.report_main_thread(1.0, translated("{name} is in Edit Mode; leave it first", name=item.name))
         yield Pause.WORKER
+
+
+def unready(source):
+    """UserError that says why no solve of a source can start now; else None."""
+    return native.problem() or refusal(source) or busy() or mesh_arrays.refusal(source)
 
 
 def busy():

@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender import mesh_arrays
 from ..blender.language import translated
-from ..blender.object_references import refusal, source_of
+from ..blender.object_references import source_of
 from ..blender.property_definitions import choice
 from ..blender.source_operator import ReportingOperator
 from ..core.errors import UserError
-from ..core.runtime import jobs, native
+from ..core.runtime import jobs
 from ..core.settings.choices import LIVE_KINDS
 from ..handles import empties
 from ..handles.movers import frozen
-from ..jobs.job_operator import busy
+from ..jobs.job_operator import unready
 from ..results.placement import placement_refusal
 from ..solver import style_settings
 from . import sessions
@@ -29,8 +28,7 @@ class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
     @classmethod
     def obstacle(cls, context):
         source = source_of(context)
-        reason = native.problem() or refusal(source) or busy() or mesh_arrays.refusal(source)
-        return reason or (None if sessions.is_live(source) else placement_refusal(source))
+        return unready(source) or (None if sessions.is_live(source) else placement_refusal(source))
 
     def execute(self, context):
         return self.toggle(context, sessions.WAIT)

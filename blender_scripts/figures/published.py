@@ -7,6 +7,7 @@ import numpy as np
 import stage
 from at_hand import data_folder
 from shapes import Shape
+from standing import enclosed
 
 import arapfields as af
 
@@ -29,11 +30,6 @@ def published(name):
     weights = [state[f"net.net.{i}.weight"].double().numpy() for i in layers]
     biases = [state[f"net.net.{i}.bias"].double().numpy() for i in layers]
     return af.NeuralSdf.from_layers(weights, biases)
-
-
-def volume(vertices, triangles):
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    return float((np.cross(a, b) * c).sum() / 6)
 
 
 def by_mesh(vertices, triangles):
@@ -85,7 +81,7 @@ def render(output):
         ("mesh", lambda: by_mesh(vertices, triangles)),
     ):
         moved, seconds = timed(call)
-        share = volume(moved, triangles) / volume(vertices, triangles)
+        share = enclosed(moved, triangles) / enclosed(vertices, triangles)
         results[name] = {"seconds": round(seconds, 2), "volume": round(share, 3)}
         columns.append((f"{name}: volume × {share:.2f}", moved))
     stage.clear()

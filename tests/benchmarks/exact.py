@@ -16,6 +16,7 @@ import arapfields as af
 from arapfields._native import testing
 
 from . import shapes
+from .live_cases import inside
 from .shapes import cases
 
 CENTERS = 1200  # of the oracle's fine scale
@@ -28,11 +29,6 @@ FINE = {"centers": 2900, "margin": 0.05}  # of exact handles beside the oracle, 
 FINE_SAMPLES = 40_000
 SINGLE = 1e-7  # what single precision leaves of the largest curvature
 VALUE, FIRST, SECOND = 1, 4, 10  # columns of jets
-
-
-def inside(handle, points):
-    local = (points - handle.rest[:3, 3]) @ np.linalg.inv(handle.rest[:3, :3]).T
-    return np.abs(local).max(1) <= 1
 
 
 def energy_of(jets, bending):
@@ -70,7 +66,7 @@ class Oracle:
         """Rows (k, size) and their targets (k, 3)."""
         rows, targets = [], []
         for handle in self.handles:
-            members = self.points[inside(handle, self.points)]
+            members = self.points[inside(handle.rest, self.points)]
             taken = self.rng.choice(len(members), min(len(members), MOST_POINTS[kind]), False)
             points, motion = np.ascontiguousarray(members[taken]), handle.motion
             order = VALUE if kind == "places" else FIRST

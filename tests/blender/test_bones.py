@@ -8,7 +8,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.bones import edit, handles_of, rigged_bar
+    from support.blender.bones import handles_of, rigged_bar
     from support.blender.live import step
 
     from addon.live import sessions
@@ -160,7 +160,7 @@ def test_what_is_wrong_with_bones_is_named():
             (bone if hasattr(bone, "select") else bone.bone).select = False
         bpy.ops.arapfields.add_bones(bones="SELECTED")
     bpy.ops.arapfields.add_bones()
-    edit(rig, lambda bones: bones.remove(bones["Second"]))
+    scenes.edit_bones(rig, lambda bones: bones.remove(bones["Second"]))
     scenes.activate(bar)
     with pytest.raises(RuntimeError, match="Armature has no bone Second"):
         bpy.ops.arapfields.deform()

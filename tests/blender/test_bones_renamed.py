@@ -8,7 +8,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.bones import edit, rigged_bar
+    from support.blender.bones import rigged_bar
     from support.blender.live import step
 
     from addon.live import sessions
@@ -33,7 +33,7 @@ def renamed_second(rig, way):
         bpy.ops.armature.duplicate()
         bpy.ops.object.mode_set(mode="OBJECT")
     if way == "edited":
-        edit(rig, lambda bones: setattr(bones["Second"], "name", "Arm"))
+        scenes.edit_bones(rig, lambda bones: setattr(bones["Second"], "name", "Arm"))
     else:
         rig.data.bones["Second"].name = "Arm"
     return "Arm"

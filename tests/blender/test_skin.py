@@ -9,7 +9,7 @@ if IN_BLENDER:
     import bpy
     from mathutils import Quaternion
     from support.blender import scenes
-    from support.blender.skins import SIDES, eye, person, rest_rig, shirt, weights_of
+    from support.blender.skins import SIDES, eye, person, shirt, weights_of
 
     from addon.names import CORRECTIVE
 
@@ -137,7 +137,9 @@ def test_the_pose_at_hand_does_not_matter():
 
 
 def far_bone(body, rig):
-    rest_rig(rig, lambda bones: setattr(bones["Spine"], "tail", (0, 0, 1.0)) or far(bones.new("Far")))
+    scenes.edit_bones(
+        rig, lambda bones: setattr(bones["Spine"], "tail", (0, 0, 1.0)) or far(bones.new("Far"))
+    )
 
 
 def far(bone):
@@ -149,7 +151,7 @@ def twin(body, rig):
         one = bones.new("Twin")
         one.head, one.tail = bones["Spine"].head, bones["Spine"].tail
 
-    rest_rig(rig, add)
+    scenes.edit_bones(rig, add)
 
 
 def no_deforming(body, rig):
@@ -158,7 +160,7 @@ def no_deforming(body, rig):
 
 
 def no_bones(body, rig):
-    rest_rig(rig, lambda bones: [bones.remove(bone) for bone in list(bones)])
+    scenes.edit_bones(rig, lambda bones: [bones.remove(bone) for bone in list(bones)])
 
 
 def no_faces(body, rig):

@@ -10,7 +10,7 @@ if IN_BLENDER:
     from support.blender import scenes
     from support.blender.baking import cancelled_at, changed_at_work
     from support.blender.panels import drawn
-    from support.blender.skins import person, rest_rig, shirt, weights_of
+    from support.blender.skins import person, shirt, weights_of
     from support.blender.stages import Operator
 
     from addon.skin.operators import ARAPFIELDS_OT_skin
@@ -112,7 +112,7 @@ def test_bones_that_change_meanwhile_leave_the_meshes_as_they_are(change):
         if change == "renamed":
             rig.data.bones["Shin.L"].name = "Calf.L"
         else:
-            rest_rig(rig, CHANGES[change])
+            scenes.edit_bones(rig, CHANGES[change])
 
     said, before, now = changed_meanwhile(changed)
     assert said == ["Rig changed while it was worked on; run again"] and now == before

@@ -10,7 +10,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.wraps import SMALL, rigged_bar, soup_of
+    from support.blender.wraps import SMALL, offsets, rigged_bar, soup_of
 
     import arapfields as af
     from addon.blender import mesh_arrays
@@ -53,12 +53,6 @@ def wrapped_bar():
     bpy.context.view_layer.update()
     scenes.activate(item)
     return item, target, rest
-
-
-def offsets(item, name):
-    block = item.data.shape_keys.key_blocks[name]
-    places = [mesh_arrays.vectors(key.data, "co").astype(float) for key in (block, block.relative_key)]
-    return places[0] - places[1]
 
 
 def test_all_that_an_object_has_comes_along():

@@ -8,19 +8,13 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.wraps import SMALL, bar_and_target, rigged_bar, soup_of
+    from support.blender.wraps import SMALL, bar_and_target, offsets, rigged_bar, soup_of
 
     from addon.blender import mesh_arrays
 
 pytestmark = pytest.mark.in_blender
 
 SINGLE = 1e-5  # Blender keeps coordinates in single precision
-
-
-def offsets(item, name):
-    block = item.data.shape_keys.key_blocks[name]
-    places = [mesh_arrays.vectors(key.data, "co").astype(float) for key in (block, block.relative_key)]
-    return places[0] - places[1]
 
 
 def shifted(item, name, by):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from support.geometry import cases, meshes
+from support.oracles.network import jets_of
 from support.tolerances import AUTOGRAD, FLOAT_FIELD_DIFFERENCES
 
 import arapfields as af
@@ -47,22 +48,6 @@ def oracle(parameters, x, width, layers, octaves, couplings):
         s, t = (h @ weight.T + take(2)).unbind(-1)
         columns[b] = columns[b] * torch.exp(BOUND * torch.tanh(s / BOUND)) + t
     return torch.stack(columns, -1) + take(3)
-
-
-def jets_of(call, points):
-    """(10, n, 3) by nested autograd, and the points that they hang on."""
-    x = torch.tensor(points, dtype=torch.float64, requires_grad=True)
-    value = call(x)
-
-    def derivatives(y):
-        ones = torch.eye(3, dtype=y.dtype)
-        rows = [torch.autograd.grad(y, x, e.expand_as(y), create_graph=True)[0] for e in ones]
-        return torch.stack(rows, 1).unbind(-1)
-
-    first = derivatives(value)
-    second = [derivatives(column) for column in first]
-    pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
-    return torch.stack([value, *first, *(second[i][j] for i, j in pairs)])
 
 
 @pytest.fixture(scope="module")

@@ -33,11 +33,3 @@ def rigged_bar(with_groups=True):
     rig.pose.bones["Second"].rotation_euler.z = 0.0
     scenes.activate(rig, bar)
     return bar, rig
-
-
-def edit(rig, change):
-    """Changes the bones of an armature in Edit Mode."""
-    scenes.activate(rig)
-    bpy.ops.object.mode_set(mode="EDIT")
-    change(rig.data.edit_bones)
-    bpy.ops.object.mode_set(mode="OBJECT")

@@ -179,4 +179,13 @@ def delete(item):
     assert item.name in bpy.data.objects
 
 
+def edit_bones(rig, change):
+    """Calls change(edit_bones) in Edit Mode of an armature."""
+    activate(rig)
+    bpy.ops.object.mode_set(mode="EDIT")
+    change(rig.data.edit_bones)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+
+
 FIT = {"iterations": 150, "width": 48, "layers": 2, "near_points": 20000}

@@ -47,17 +47,8 @@ def person(half=False):
             thigh = bone(f"Thigh.{side}", (x, 0, HIP), (x, 0, KNEE), spine)
             bone(f"Shin.{side}", (x, 0, KNEE), (x, 0, FOOT), thigh)
 
-    rest_rig(rig, add)
+    scenes.edit_bones(rig, add)
     return body, rig
-
-
-def rest_rig(rig, change):
-    """Calls change(edit_bones) in Edit Mode."""
-    scenes.activate(rig)
-    bpy.ops.object.mode_set(mode="EDIT")
-    change(rig.data.edit_bones)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    bpy.context.view_layer.update()
 
 
 def shirt(body):

@@ -8,6 +8,7 @@ from support.blender.character import link, rig, weigh
 from support.geometry.characters import Capsules
 
 import arapfields as af
+from addon.blender import mesh_arrays
 
 SMALL = {"centers": 50, "stages": 3, "iterations": 6, "samples": 1000}
 
@@ -129,3 +130,10 @@ def joints(armature, posed):
     bones = armature.pose.bones
     ends = [(b.head, b.tail) if posed else (b.bone.head_local, b.bone.tail_local) for b in bones]
     return np.array([armature.matrix_world @ end for pair in ends for end in pair])
+
+
+def offsets(item, name):
+    """(n, 3) offsets of a shape key from the key that it is relative to."""
+    block = item.data.shape_keys.key_blocks[name]
+    places = [mesh_arrays.vectors(key.data, "co").astype(float) for key in (block, block.relative_key)]
+    return places[0] - places[1]

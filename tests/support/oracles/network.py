@@ -32,23 +32,7 @@ class Network:
         return h @ self.weights[-1].T + self.biases[-1]
 
     def jets(self, points, order):
-        """(columns, n, outputs): value, ∂_1..3, then ∂_11, ∂_22, ∂_33, ∂_12, ∂_13, ∂_23."""
-        x = torch.tensor(np.asarray(points), dtype=torch.float64, requires_grad=True)
-        value = self(x)
-
-        def derivatives(y):
-            ones = torch.eye(y.shape[1], dtype=y.dtype)
-            rows = [torch.autograd.grad(y, x, e.expand_as(y), create_graph=True)[0] for e in ones]
-            return torch.stack(rows, 1).unbind(-1)
-
-        columns = [value]
-        if order > 0:
-            first = derivatives(value)
-            columns += first
-        if order > 1:
-            second = [derivatives(column) for column in first]
-            columns += [second[i][j] for i, j in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]]
-        return torch.stack(columns)
+        return jets_of(self, points, order)
 
     def flat_gradient(self):
         pairs = zip(self.weights, self.biases, strict=True)
@@ -56,3 +40,23 @@ class Network:
         return np.concatenate(
             [(zero(t) if t.grad is None else t.grad).numpy().ravel() for pair in pairs for t in pair]
         )
+
+
+def jets_of(call, points, order=2):
+    """(columns, n, outputs): value, ∂_1..3, then ∂_11, ∂_22, ∂_33, ∂_12, ∂_13, ∂_23, by nested autograd."""
+    x = torch.tensor(np.asarray(points), dtype=torch.float64, requires_grad=True)
+    value = call(x)
+
+    def derivatives(y):
+        ones = torch.eye(y.shape[1], dtype=y.dtype)
+        rows = [torch.autograd.grad(y, x, e.expand_as(y), create_graph=True)[0] for e in ones]
+        return torch.stack(rows, 1).unbind(-1)
+
+    columns = [value]
+    if order > 0:
+        first = derivatives(value)
+        columns += first
+    if order > 1:
+        second = [derivatives(column) for column in first]
+        columns += [second[i][j] for i, j in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]]
+    return torch.stack(columns)
