@@ -24,9 +24,12 @@ def read_by(curve):
     return [target for variable in curve.driver.variables for target in variable.targets]
 
 
-def paths_of(part):
-    """Data paths of the writable properties of a modifier, constraint or target, and of inputs of nodes."""
-    paths = writable(part)
+def paths_of(part, kind=None):
+    """Data paths of the writable properties of a modifier, constraint or target, and of inputs of nodes.
+
+    `kind`: only those of this type, such as "POINTER".
+    """
+    paths = writable(part, kind)
     if getattr(part, "type", "") != "NODES":
         return paths
     if not hasattr(part, "properties"):  # before Blender 5.2, inputs are ID properties
@@ -35,17 +38,18 @@ def paths_of(part):
         slots = getattr(part.properties, side)
         names = [one.identifier for one in slots.bl_rna.properties if one.type == "POINTER"]
         for name in names[1:]:  # the first is rna_type
-            paths += [f"properties.{side}.{name}.{value}" for value in writable(getattr(slots, name))]
+            paths += [f"properties.{side}.{name}.{value}" for value in writable(getattr(slots, name), kind)]
     return paths
 
 
-def writable(struct):
-    return [one.identifier for one in struct.bl_rna.properties if not one.is_readonly]
+def writable(struct, kind):
+    properties = struct.bl_rna.properties
+    return [one.identifier for one in properties if not one.is_readonly and kind in (None, one.type)]
 
 
 def references(part):
     """[(data path, data-block)] of a part's references."""
-    found = [(path, part.path_resolve(path)) for path in paths_of(part)]
+    found = [(path, part.path_resolve(path)) for path in paths_of(part, "POINTER")]
     return [(path, value) for path, value in found if isinstance(value, bpy.types.ID)]
 
 
