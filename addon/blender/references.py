@@ -63,14 +63,14 @@ def put_at(item, path, value):
         setattr(owner, name, value)
 
 
-def remap(parts, own):
-    """Replaces references of a copy's parts by `own`, {data-block: its counterpart}."""
+def remap(parts, twins):
+    """Replaces references of a copy's parts by `twins`, {data-block: its counterpart}."""
     for part in parts:
         for path, value in references(part):
-            if own.get(value) is not None:
+            if twins.get(value) is not None:
                 if isinstance(part, bpy.types.DriverTarget):
-                    copy_property(value, own[value], part.data_path)
-                put_at(part, path, own[value])
+                    copy_property(value, twins[value], part.data_path)
+                put_at(part, path, twins[value])
 
 
 def copy_property(given, there, path):

@@ -18,16 +18,17 @@ def pairs(source, target):
 
 def counterparts(source, target):
     """{data-block of the source: the target's}: of both objects and of the armatures that pose them."""
-    own = {}
-    for given, there in [(source, target), *pairs(source, target).items()]:
-        own |= zip(blocks_of(given), blocks_of(there), strict=False)
-    return own
+    found = blocks(source, target)
+    for given, there in pairs(source, target).items():
+        found |= blocks(given, there)
+    return found
 
 
-def blocks_of(item):
-    """The object, its data and their shape keys, as far as there are any."""
-    blocks = [item, item.data, getattr(item.data, "shape_keys", None)]
-    return [block for block in blocks if block is not None]
+def blocks(given, there):
+    """{data-block: its counterpart} of two objects, their data and their shape keys, if both have any."""
+    both = [(given, there), (given.data, there.data)]
+    both.append([getattr(item.data, "shape_keys", None) for item in (given, there)])
+    return {one: other for one, other in both if one is not None and other is not None}
 
 
 def copied(item, target):
@@ -36,7 +37,7 @@ def copied(item, target):
     if item.data is not None:
         own.data = item.data.copy()
     own.name = f"{item.name} {target.name}"
-    for block in blocks_of(own):
+    for block in blocks(item, own).values():
         own_action(block)
     settings_of(own).rest_bones = ""  # its bones are not fitted
     for home in target.users_collection:
@@ -44,12 +45,14 @@ def copied(item, target):
     return own
 
 
-def remap_copies(made, own):
-    """Replaces references of copies, {object: its copy}, to one another and by `own`."""
+def remap_copies(made, twins):
+    """Replaces references of copies, {object: its copy}, to one another and by `twins`, {data-block: its
+    counterpart}."""
+    copies = {}
     for given, there in made.items():
-        own = own | dict(zip(blocks_of(given), blocks_of(there), strict=False))
-    for block in [block for there in made.values() for block in blocks_of(there)]:
-        references.remap(references.parts_of(block), own)
+        copies |= blocks(given, there)
+    for block in copies.values():
+        references.remap(references.parts_of(block), twins | copies)
 
 
 def copy_drivers(source, target):
@@ -57,9 +60,9 @@ def copy_drivers(source, target):
     given, keys = source.data.shape_keys, target.data.shape_keys
     if given.animation_data is None:
         return
-    own = counterparts(source, target)
+    twins = counterparts(source, target)
     for curve in given.animation_data.drivers:
         if keys.animation_data is not None and keys.animation_data.drivers.find(curve.data_path):
             keys.driver_remove(curve.data_path)
         made = keys.animation_data_create().drivers.from_existing(src_driver=curve)
-        references.remap(references.read_by(made), own)
+        references.remap(references.read_by(made), twins)
