@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a figure lacks here, before it is tried."""
+"""Checks the requirements of a figure before it is rendered."""
 
 import os
 from pathlib import Path
@@ -7,7 +7,7 @@ from pathlib import Path
 import windowed
 
 ROOT = Path(__file__).resolve().parents[1]
-PEERS = ROOT / "build" / "bench" / "peers"  # what make bench PEERS=path keeps of its results
+PEERS = ROOT / "build" / "bench" / "peers"  # results of `make bench PEERS=path`
 
 
 def data_folder():
@@ -15,7 +15,7 @@ def data_folder():
 
 
 def lacking(figure):
-    """One line; None where the figure can be made."""
+    """A line that names a missing requirement; None if the figure can be rendered."""
     if figure.published and not data_folder().is_dir():
         return f"no published shapes at {data_folder()}"
     if figure.peers and not any(PEERS.glob("moved-*.npz")):

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes the animation of a .blend, as it is.
+"""Bakes the animation of a .blend.
 
     blender -b -P blender_scripts/bake.py -- --input walk.blend --output walk_baked.blend
     python blender_scripts/bake.py …          where bpy is installed
     blender --command arapfields bake …       where the extension is installed
 
-`--help` tells the flags; docs/command-line.md more.
+See `--help` and docs/command-line.md.
 """
 
 import sys

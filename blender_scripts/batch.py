@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Deforms or stylizes every file of a folder, several at once, and skips what is done already.
+"""Deforms or stylizes every file of a folder in parallel, and skips existing results.
 
     blender -b -P blender_scripts/batch.py -- --style cube --input meshes --output cubic --jobs 2
     python blender_scripts/batch.py …          where bpy is installed
     blender --command arapfields batch …       where the extension is installed
 
-`--help` tells the flags; docs/command-line.md more.
+See `--help` and docs/command-line.md.
 """
 
 import sys

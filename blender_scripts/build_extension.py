@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the Blender extension: for each platform a zip with the add-on and the wheels that it needs.
+"""Builds the Blender extension: a zip with the add-on and its wheels for each platform.
 
 python blender_scripts/build_extension.py linux-x64 windows-x64 --output dist
 """
@@ -27,7 +27,7 @@ def arguments():
 
 
 def own_wheels(platform, folder, version):
-    """The wheels for all Pythons, as build_wheels.py made them."""
+    """The wheels for all Pythons, built by build_wheels.py."""
     names = map(platform.wheel_tags, platform.wheels)
     wheels = [folder / f"arapfields-{version}-{name}.whl" for name in names]
     missing = [wheel.name for wheel in wheels if not wheel.exists()]
@@ -37,7 +37,7 @@ def own_wheels(platform, folder, version):
 
 
 def polib(folder):
-    """The wheel of polib, which reads translations, in the version of requirements.txt."""
+    """The wheel of polib (reads translations), in the version of requirements.txt."""
     (pinned,) = [line for line in (ROOT / "requirements.txt").read_text().splitlines() if "polib==" in line]
     command = [sys.executable, "-m", "pip", "download", "-q", "--disable-pip-version-check", "--no-deps"]
     subprocess.run([*command, "--only-binary", ":all:", "--dest", folder, pinned], check=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A character of ours: a child's body in one piece, with a rig; eyes, shirt and hair are separate objects."""
+"""A character: a child's body as one mesh, with a rig; eyes, shirt and hair are separate objects."""
 
 import functools
 import math
@@ -26,7 +26,7 @@ for s, side in ((1, "L"), (-1, "R")):
     BONES[f"Leg.{side}"] = ("Hips", (s * 0.12, 0, 0.56), (s * 0.13, 0, 0.05))
 JOINTS = {
     name: bone for name, bone in BONES.items() if not name.startswith("Leg")
-}  # knees, ankles, wrists too
+}  # knees, ankles, wrists as well
 for s, side in ((1, "L"), (-1, "R")):
     JOINTS[f"Forearm.{side}"] = (f"Upper Arm.{side}", (s * 0.42, 0, 1.03), (s * 0.65, 0, 0.99))
     JOINTS[f"Hand.{side}"] = (f"Forearm.{side}", (s * 0.65, 0, 0.99), (s * 0.80, 0, 0.97))
@@ -38,7 +38,7 @@ EYE, EYES = 0.075, [(side * 0.125, -0.235, 1.545) for side in (-1, 1)]
 
 @functools.cache
 def body(cells=120):
-    """The Shape: head, trunk, arms to the sides, legs; looks towards -y, 1.8 high."""
+    """The Shape: head, trunk, arms to the sides, legs; faces -y, 1.8 high."""
     middle = [
         Ellipsoid((0, 0.01, 1.52), (0.31, 0.29, 0.29)),
         Ellipsoid((0, -0.30, 1.45), (0.035, 0.04, 0.032), blend=0.03),
@@ -61,7 +61,7 @@ def body(cells=120):
 
 
 def coloured(name, shape, roughness=0.45):
-    """A smooth mesh object in the colours of its vertices."""
+    """A smooth mesh object with vertex colours."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(shape.vertices.tolist(), [], shape.triangles.tolist())
     mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
@@ -73,7 +73,7 @@ def coloured(name, shape, roughness=0.45):
 
 
 def shirt(skin, loose=0.028):
-    """The trunk and the upper arms, cut straight, off the skin."""
+    """A shirt: trunk and upper arms, with straight edges, at a distance from the skin."""
     made = bmesh.new()
     made.from_mesh(skin.data)
     for place, out in (((0, 0, 0.66), (0, 0, -1)), ((0, 0, 1.165), (0, 0, 1))):
@@ -103,13 +103,13 @@ def shirt(skin, loose=0.028):
 
 
 def cut(made, place, out):
-    """Removes what lies out of a plane."""
+    """Removes the vertices on the outer side of a plane."""
     parts = [*made.verts, *made.edges, *made.faces]
     bmesh.ops.bisect_plane(made, geom=parts, plane_co=place, plane_no=out, clear_outer=True)
 
 
 def split(item):
-    """Each triangle gets corners of its own, and keeps how it is shaded."""
+    """Separates the triangles, and keeps their shading."""
     normals = [tuple(vertex.normal) for vertex in item.data.vertices]
     corners = [normals[loop.vertex_index] for loop in item.data.loops]
     made = bmesh.new()
@@ -124,7 +124,7 @@ def eye(place, side):
     """A ball with its pupil towards -y."""
     bpy.ops.mesh.primitive_uv_sphere_add(segments=32, ring_count=24, radius=EYE, location=place)
     item = bpy.context.object
-    item.data.transform(Matrix.Rotation(math.radians(90), 4, "X"))  # its poles in front and behind
+    item.data.transform(Matrix.Rotation(math.radians(90), 4, "X"))  # poles in front and behind
     item.name = f"Eye.{side}"
     item.data.polygons.foreach_set("use_smooth", [True] * len(item.data.polygons))
     for name, colour in (("white", (0.9, 0.9, 0.88)), ("pupil", (0.02, 0.02, 0.03))):
@@ -135,12 +135,12 @@ def eye(place, side):
 
 
 def scalp(middles):
-    """Of triangles at these middles: whether hair grows there."""
+    """Whether hair grows on the triangles with these centers."""
     return (middles[:, 2] > 1.62 - 0.35 * np.maximum(middles[:, 1], 0)) & (middles[:, 1] > -0.19)
 
 
 def build_scene():
-    """The character at rest: body, rig, eyes, shirt, hair; nothing of it is bound to anything yet."""
+    """The character at rest: body, rig, eyes, shirt, hair, without any bindings."""
     made = SimpleNamespace(body=coloured("Body", body()))
     made.rig = dressing.rig(BONES)
     dressing.weigh(made.body, BONES)
@@ -153,7 +153,7 @@ def build_scene():
 
 
 def near(points, place, radii):
-    """A weight of each point: 1 at the place, less away from it."""
+    """(n,) weights of points: 1 at `place`, decreasing with the distance."""
     return np.exp(-(((points - place) / radii) ** 2).sum(axis=1))[:, None]
 
 
@@ -172,7 +172,7 @@ def add_keys(item):
 
 
 def rigged():
-    """[body, shirt, eyes] that one rig poses by weights of their own; the body has keys."""
+    """[body, shirt, eyes], each with weights of one rig; the body has shape keys."""
     whole, bones = coloured("Child", body(cells=100)), dressing.rig(BONES)
     shirt(whole).modifiers.clear()
     items = [whole, bpy.data.objects["Shirt"]]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Animals of our own: see shapes.py for what a Shape is."""
+"""Animals; shapes.py explains Shapes."""
 
 import functools
 import math
@@ -12,7 +12,7 @@ DARK = (0.02, 0.02, 0.03)
 
 @functools.cache
 def lizard():
-    """A gecko, head towards -y: thin tail and twenty toes."""
+    """A gecko with a thin tail and twenty toes, head towards -y."""
     skin, belly, spot = (0.13, 0.42, 0.08), (0.66, 0.62, 0.25), (0.80, 0.22, 0.03)
     spine = [(0, -0.62, 0.2), (0, -0.32, 0.2), (0.02, 0.05, 0.2), (0, 0.42, 0.19), (-0.08, 0.75, 0.15)]
     body = tube(spine, [0.1, 0.165, 0.2, 0.15, 0.1])
@@ -61,7 +61,7 @@ def lizard():
 
 @functools.cache
 def dinosaur():
-    """A tyrannosaur on two legs, seen from its left when looking along +x; looks towards -y."""
+    """A tyrannosaur on two legs that faces -y."""
     skin, belly, crest = (0.06, 0.27, 0.38), (0.70, 0.62, 0.42), (0.80, 0.20, 0.04)
     body = tube(
         [
@@ -120,7 +120,7 @@ def dinosaur():
 
 @functools.cache
 def dog():
-    """A sitting-eared, curly-tailed dog on four legs, looking towards -y."""
+    """A dog with pricked ears and a curled tail, on four legs, facing -y."""
     fur, light = (0.62, 0.27, 0.06), (0.85, 0.76, 0.60)
     body = tube([(0, -0.42, 0.72), (0, 0.0, 0.72), (0, 0.45, 0.70)], [0.27, 0.24, 0.23])
     head = [

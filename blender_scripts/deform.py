@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Deforms the meshes of one file under handles.
+"""Deforms the meshes of one file by handles.
 
     blender -b -P blender_scripts/deform.py -- --input spot.ply --output bent.ply --handles pose.json
     python blender_scripts/deform.py …          where bpy is installed
     blender --command arapfields deform …       where the extension is installed
 
-`--help` tells the flags; docs/command-line.md more.
+See `--help` and docs/command-line.md.
 """
 
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What there is, end to end, headless: a dog is posed by pins with a hat carried, stylized, and wrapped.
+"""Demo without a window: a dog is posed by pins with a carried hat, stylized, and wrapped.
 
     python blender_scripts/demo.py [--output out]
 
@@ -28,8 +28,8 @@ from mathutils import Matrix, Vector  # noqa: E402
 
 import addon  # noqa: E402
 
-SPACING, TURN = 1.85, 38.0  # from one to the next along x, and degrees by which each faces the camera
-# On the dog at rest: (place, radius) of what stays; of pins also the shift and the turn about x of each.
+SPACING, TURN = 1.85, 38.0  # distance of columns along x; degrees of rotation towards the camera
+# On the dog at rest: (place, radius) of anchors; of pins also translation and rotation about x.
 ANCHORS = [((0.17, 0.45, 0.06), 0.17), ((-0.17, 0.45, 0.06), 0.17), ((-0.17, -0.48, 0.06), 0.17)]
 PINS = [
     ((0.17, -0.48, 0.10), 0.17, (0.06, -0.42, 0.42), 0.9),  # gives the paw
@@ -44,18 +44,18 @@ CAPTIONS = [
     "the scan\nof another",
     "wrapped\nonto it",
 ]
-LANDMARKS = [  # on the dog, on the scan; and those with x of the other side
+LANDMARKS = [  # on the dog, on the scan; mirrored in x as well
     ((0, -1.12, 1.15), (0, -1.36, 1.30)),
     ((0.08, 0.50, 1.18), (0, 1.22, 1.24)),
     ((0.20, -0.58, 1.57), (0.24, -0.66, 1.76)),
     ((0.17, -0.62, 0.05), (0.19, -0.72, 0.05)),
     ((0.17, 0.36, 0.05), (0.19, 0.42, 0.05)),
 ]
-SCREEN = os.fdopen(os.dup(1), "w")  # stays when Blender's own lines are sent away
+SCREEN = os.fdopen(os.dup(1), "w")  # the terminal, while Blender's output is discarded
 
 
 def job_progress():
-    """Share done and message of the operator's job, if one runs."""
+    """(progress, message) of the running job, if any."""
     from addon.core.runtime import jobs
 
     return jobs.progress()
@@ -90,7 +90,7 @@ def timed(title, progress=job_progress):
 
 @contextlib.contextmanager
 def alone():
-    """Blender and Cycles write hundreds of lines to the standard streams: they go nowhere."""
+    """Context manager: discards the standard streams, to which Blender and Cycles write hundreds of lines."""
     kept = [os.dup(number) for number in (1, 2)]
     with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
         for number in (1, 2):
@@ -98,7 +98,7 @@ def alone():
         try:
             yield
         finally:
-            ctypes.CDLL(None).fflush(None)  # what C still holds goes nowhere, too
+            ctypes.CDLL(None).fflush(None)  # discards C's buffers as well
             for number, stream in zip((1, 2), kept, strict=True):
                 os.dup2(stream, number)
                 os.close(stream)
@@ -114,7 +114,7 @@ def stand(name, shape, column):
 
 
 def hat(dog):
-    """A party hat between the ears: an object of its own."""
+    """A party hat between the ears, as an object."""
     bpy.ops.mesh.primitive_cone_add(vertices=48, radius1=0.15, radius2=0.01, depth=0.36)
     item = bpy.context.object
     item.name = "Hat"
@@ -133,7 +133,7 @@ def activate(item, *others):
 
 
 def add_pins(dog):
-    """Anchors and pins by the tool's operator; the pins' Empties."""
+    """Adds anchors and pins by the tool's operator; returns the pins' Empties."""
     activate(dog)
     for place, radius in ANCHORS:
         bpy.ops.arapfields.pin_add(location=dog.matrix_world @ Vector(place), radius=radius, anchor=True)
@@ -143,13 +143,13 @@ def add_pins(dog):
 
 
 def draw_pins(dog):
-    """Balls and cubes before the surface, where the pins and anchors are."""
+    """Adds balls and cubes at the pins and anchors, in front of the surface."""
     towards = Vector((0, -0.3, 0.06))
     return [stage.pin(h.empty.matrix_world.translation + towards, h.anchor) for h in dog.arapfields.handles]
 
 
 def pose(dog, hats):
-    """In place: a modifier of the dog; the hat goes along as a whole."""
+    """Deforms the dog by a modifier; the hat is carried as a whole."""
     turn = dog.matrix_world.to_3x3()
     for empty, (_, _, shift, angle) in zip(add_pins(dog), PINS, strict=True):
         there = dog.matrix_world @ Matrix.Rotation(angle, 4, "X") @ dog.matrix_world.inverted()
@@ -164,7 +164,7 @@ def pose(dog, hats):
 
 
 def wrap(dog, scan):
-    """The dog on the scan, and then one column aside."""
+    """Wraps the dog onto the scan, then moves it to the next column."""
     dog.arapfields.wrap.onto = scan
     activate(dog)
     for on_dog, on_scan in LANDMARKS:

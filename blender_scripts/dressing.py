@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What makes a character of a body in Blender: a rig, weights, hair. Bones are name: (parent, head, tail)."""
+"""Rig, weights and hair of characters. Bones are {name: (parent, head, tail)}."""
 
 import bpy
 import numpy as np
@@ -27,7 +27,7 @@ def rig(bones, name="Rig"):
 
 
 def weigh(item, bones, blend=0.04):
-    """Vertex groups of the bones, which blend where two are about as near."""
+    """Adds vertex groups of the bones, blended where two are about equally near."""
     points = np.array([vertex.co for vertex in item.data.vertices])
     away = []
     for _, head, tail in bones.values():
@@ -43,7 +43,7 @@ def weigh(item, bones, blend=0.04):
 
 
 def seen_mesh(item):
-    """(vertices (n, 3) in the world, their normals, triangles) of an object as it is shown."""
+    """((n, 3) evaluated vertices in world space, their normals, triangles) of an object."""
     bpy.context.view_layer.update()
     seen = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh, world = seen.to_mesh(), np.array(seen.matrix_world)
@@ -56,7 +56,7 @@ def seen_mesh(item):
 
 
 def strands(body, chosen, every=7, length=0.12, droop=3.0, steps=6, radius=None):
-    """Hair that grows from the triangles whose middles (n, 3) are chosen, every so many of them."""
+    """Hair curves from every `every`-th of the triangles whose centers (n, 3) are chosen."""
     points, normals, triangles = seen_mesh(body)
     middles, out = points[triangles].mean(axis=1), normals[triangles].mean(axis=1)
     rows = np.flatnonzero(chosen(middles))[::every]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scenes that the workflow pages start from, with everything set up.
+"""The example scenes of the workflow pages.
 
     python blender_scripts/examples.py [--output out/examples]
 
@@ -24,18 +24,18 @@ import walking  # noqa: E402
 from mathutils import Vector  # noqa: E402
 
 MESHES = ("dinosaur", "dog", "lizard", "octopus", "mug", "chapel")
-HANDLES = {  # of animate.blend: place and half-extents
+HANDLES = {  # of animate.blend: center and half extents
     "Feet": ((0, -0.02, 0.14), (0.45, 0.26, 0.17)),
     "Head": ((0, -0.72, 1.40), (0.28, 0.36, 0.30)),
     "Tail": ((0, 1.27, 0.82), (0.16, 0.26, 0.18)),
 }
 BALL = 0.4  # radius of the obstacle in contact.blend
-APART = 1.7  # the scan from the dog, along x
-LAST = 48  # frame; the motion repeats after it
+APART = 1.7  # distance of scan and dog along x
+LAST = 48  # last frame of the motion, which is a loop
 
 
 def figure(name, shape, turn):
-    """The shape as an object that stands on the floor, turned about the vertical by degrees."""
+    """An object of the shape on the floor, rotated about z by `turn` degrees."""
     item = child.coloured(name, menagerie.load(shape))
     item.rotation_euler.z = turn
     item.location.z = -min(vertex.co.z for vertex in item.data.vertices)
@@ -43,7 +43,7 @@ def figure(name, shape, turn):
 
 
 def in_studio(shown, width=960, azimuth=55, elevation=10, around=()):
-    """Light, floor and camera, in a collection that no click selects."""
+    """Light, floor and camera, in a collection that is not selectable."""
     before = set(bpy.data.objects)
     stage.set_up(shown, width=width, azimuth=azimuth, elevation=elevation, margin=0.06, around=around)
     stage.brighten(1.4)
@@ -70,14 +70,14 @@ def pins():
 
 
 def character():
-    """A rigged child with eyes, a shirt and hair, each an object of its own."""
+    """A rigged child with eyes, a shirt and hair as separate objects."""
     made = child.build_scene()
     in_studio([made.body], azimuth=18, elevation=6, around=[(-0.95, 0, 1.9), (0.95, 0, 1.9)])
     chosen(made.body)
 
 
 def skin():
-    """A body whose triangles are not joined, eyes, a shirt, and an armature that moves none of them yet."""
+    """A body of separate triangles, eyes, a shirt, and an armature without bindings."""
     body = child.coloured("Body", child.body(cells=72))
     child.shirt(body)
     child.split(body)
@@ -90,7 +90,7 @@ def skin():
 
 
 def animate():
-    """A creature whose handles have keys."""
+    """A creature with animated handles."""
     dinosaur = figure("Dinosaur", "dinosaur", 0)
     empties = held(dinosaur, HANDLES)
     scene = bpy.context.scene
@@ -120,7 +120,7 @@ def handle(name, place, half):
 
 
 def held(item, places):
-    """Empties by name as handles of an object; places: name -> middle and half-extents."""
+    """Adds Empties as handles of an object; places: {name: center and half extents}."""
     empties = {name: handle(name, *place) for name, place in places.items()}
     bpy.context.view_layer.update()
     chosen(item)
@@ -131,7 +131,7 @@ def held(item, places):
 
 
 def walk():
-    """A creature that walks on the spot by keys of its feet and hips: neck, head and tail are nobody's."""
+    """A creature that walks in place by animated feet and hips, without handles of neck, head and tail."""
     dinosaur = figure("Dinosaur", "dinosaur", 0)
     walking.set_keys(held(dinosaur, walking.HANDLES))
     in_studio(
@@ -143,7 +143,7 @@ def walk():
 
 
 def wrap():
-    """A dog to be laid onto the scan of another: rough, and open where no scanner looks."""
+    """A dog, and as its target the scan of another one, rough and with holes."""
     dog = figure("Dog", "dog", 0)
     scan = child.coloured("Scan", scanned.hound(), roughness=0.8)
     scan.location.x = APART
@@ -152,7 +152,7 @@ def wrap():
 
 
 def transfer():
-    """A child with a rig, keys, eyes and a shirt, and a grown-up that has a mesh alone; landmarks on both."""
+    """A child with a rig, shape keys, eyes and a shirt, an adult's mesh, and landmarks on both."""
     body, other = grown.beside_child(APART)
     in_studio([body, other], azimuth=24, elevation=6, around=[(-0.9, 0, 1.9), (APART + 1.05, 0, 2.3)])
     stage.brighten(0.75)
@@ -160,14 +160,14 @@ def transfer():
 
 
 def stylize():
-    """A dog to be turned towards a solid."""
+    """A dog, to be stylized."""
     dog = figure("Dog", "dog", 0)
     in_studio([dog], azimuth=40, around=[(0, -1.2, 1.7), (0, 0.9, 1.7)])
     chosen(dog)
 
 
 def contact():
-    """A soft bar above a ball, held at both ends."""
+    """A soft bar above a ball, with handles at both ends."""
     bar = figure("Bar", "slender_bar", 0)
     bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=BALL, location=(0, 0, BALL))
     ball = bpy.context.object
@@ -187,7 +187,7 @@ SCENES = (pins, character, skin, animate, walk, stylize, wrap, transfer, contact
 
 
 def comfortable():
-    """Viewports that show the colours, through the camera, with the sidebar open."""
+    """Sets viewports to show colours, the camera's view and the sidebar."""
     for screen in list(bpy.data.screens):
         for area in screen.areas:
             for space in area.spaces:
@@ -198,7 +198,7 @@ def comfortable():
 
 
 def write(folder):
-    """All of them; the files' names."""
+    """Writes all scenes; returns the files' names."""
     folder.mkdir(parents=True, exist_ok=True)
     for scene in SCENES:
         bpy.ops.wm.read_homefile(use_factory_startup=True)
@@ -243,4 +243,4 @@ if __name__ == "__main__":
 
     main()
     sys.stdout.flush()
-    os._exit(0)  # bpy 4.5 may wait forever for a thread of its own while the process ends
+    os._exit(0)  # bpy 4.5 may deadlock at the end of the process

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renders the documentation's pictures that are out of date, headless, each in a process of its own.
+"""Renders the documentation's pictures that are out of date, without a window, each in a separate process.
 
     python blender_scripts/gallery.py [--output docs/gallery] [--only NAME ...] [--all] [--jobs N] [--list]
 
-A picture is up to date when its modules, those that all share and the library's sources are what it was made
-with (manifest.json in the output folder, which also holds the figures measured on the way). Figures of
-published shapes need ../shared/data (or ARAPFIELDS_DATA) and go to out/gallery, outside the repository; those
-of a window need a Blender that has one (windowed.py). What is not at hand is said and left as it is.
+A picture is up to date if a hash of its modules, the common modules and the library's sources is unchanged.
+manifest.json in the output folder contains the hashes and measured figures. Figures of published shapes need
+../shared/data (or ARAPFIELDS_DATA) and are written to out/gallery, outside the repository; those of a window
+need a Blender with a window (windowed.py). Figures with missing requirements are reported and left out.
 """
 
 import argparse
@@ -41,7 +41,7 @@ OF_PAGES = [
     "grown.py",
     "scanned.py",
     "walking.py",
-]  # of figures that run a page's script
+]  # modules of figures that run a page's script
 LIBRARY = [
     path
     for path in sorted((ROOT / "native").rglob("*"))
@@ -49,12 +49,12 @@ LIBRARY = [
 ]
 
 
-DRAWN = "drawn.json"  # which pictures a figure's process has made, and what it measured
+DRAWN = "drawn.json"  # the pictures and measurements of a figure's process
 ONE_AT_A_TIME = threading.Lock()
 
 
 def with_imports(name, found=()):
-    """A figure's module and those that it takes from: figures share cases and options."""
+    """A figure's module, and the modules that it imports."""
     path = HERE / "figures" / f"{name}.py"
     if path in found:
         return list(found)
@@ -65,7 +65,7 @@ def with_imports(name, found=()):
 
 
 def content_hash(figure):
-    """Of what a picture is made from: the library's sources, stage and shapes, and its own modules."""
+    """Hash of the library's sources, stage and shapes, and the figure's modules."""
     digest = hashlib.sha256(b"draft" if "STAGE_DRAFT" in os.environ else b"")
     further = [*(HERE / name for name in OF_PAGES), *(ROOT / "docs" / page for page in figure.pages)]
     for path in [*LIBRARY, *(HERE / name for name in SHARED), *with_imports(figure.name)]:
@@ -77,12 +77,12 @@ def content_hash(figure):
 
 
 def pictures(folder):
-    """Those of a figure: sheets, and loops with the frame that stands for each."""
+    """The pictures of a figure: sheets, and loops with a still frame of each."""
     return [path for path in folder.iterdir() if path.suffix in (SUFFIX, ".jpg")]
 
 
 def draw(name, folder):
-    """In the figure's own process: renders into an empty folder, and leaves what was measured there."""
+    """In the figure's process: renders into an empty folder, and writes the measurements there."""
     measured = importlib.import_module(f"figures.{name}").render(folder)
     for path in folder.glob("*.png"):
         store(path)
@@ -102,7 +102,7 @@ def read_manifest(folder):
 
 
 def take(figure, drawn, folder):
-    """Puts what was drawn in its place, and into the manifest."""
+    """Moves the pictures to their place, and updates the manifest."""
     entry = json.loads((drawn / DRAWN).read_text())
     for file in entry["files"]:
         os.replace(drawn / file, folder / file)
@@ -112,7 +112,7 @@ def take(figure, drawn, folder):
 
 
 def bring_up_to_date(figure, folder, force):
-    """One line on the screen; False where rendering failed, which leaves the pictures as they were."""
+    """Renders a figure if necessary, and prints a line; False, with the old pictures, if rendering failed."""
     title = f"{figure.name:16} {figure.shows} ..."
     if is_up_to_date(figure, folder) and not force:
         print(f"{figure.name:16} up to date", flush=True)
@@ -131,7 +131,7 @@ def bring_up_to_date(figure, folder, force):
 
 
 def work_of_children():
-    """Processor seconds of all figures so far."""
+    """Processor time of all figures up to now, in seconds."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
@@ -151,7 +151,7 @@ def main():
     if options.draw:
         draw(options.draw, options.output.resolve())
         sys.stdout.flush()
-        os._exit(0)  # bpy 4.5 may wait forever for a thread of its own while the process ends
+        os._exit(0)  # bpy 4.5 may deadlock at the end of the process
     if options.list:
         print("\n".join(f"{figure.name:16} {figure.shows}" for figure in FIGURES))
         return 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A grown-up of the child's parts: longer legs, a smaller head, arms that hang; the child is laid onto it."""
+"""An adult, the target of a wrap of the child: longer legs, a smaller head, hanging arms."""
 
 import bpy
 import child
@@ -34,7 +34,7 @@ def body():
 
 
 def beside_child(apart):
-    """(child, grown-up so far along x): landmarks on both, what the child wears is carried."""
+    """(child, adult at distance `apart` along x), with landmarks on both; the child carries its clothes."""
     whole, *worn = child.rigged()
     other = child.coloured("Grown-up", body())
     other.location.x = apart

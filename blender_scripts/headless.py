@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What deform.py, stylize.py and batch.py share: they are commands of the add-on, run by a script.
+"""Common part of deform.py, stylize.py, batch.py and the like, which run commands of the add-on.
 
-The add-on is the installed extension where that is enabled, else the one of this repository.
+The add-on is the installed extension if that is enabled, else that of this repository.
 """
 
 import contextlib
@@ -29,21 +29,21 @@ def addon():
 
 
 def main(verb, script):
-    """Runs the verb with the arguments behind `--` (in Blender) or all of them (in Python); exits."""
+    """Runs the verb with the arguments after `--` (in Blender) or all of them (in Python), and exits."""
     try:
         import bpy
     except ImportError as error:
         sys.exit(f"{script}: run it as `blender -b -P {script} -- …`, or where bpy is installed ({error})")
     arguments = sys.argv[1:]
-    if bpy.app.binary_path:  # Blender itself, not Python's module
+    if bpy.app.binary_path:  # the program, not the module
         arguments = arguments[arguments.index("--") + 1 :] if "--" in arguments else []
     run = importlib.import_module(f"{addon().__name__}.commands.main").run
     code = run([verb, *arguments], script)
     sys.stdout.flush()
     if bpy.app.binary_path:
         sys.exit(code)
-    # As Python ends, its module of Blender may wait for ever for a thread of its own.
+    # bpy may deadlock at the end of Python.
     sys.stderr.flush()
     with contextlib.suppress(OSError):
-        os.rmdir(bpy.app.tempdir)  # which is left empty
+        os.rmdir(bpy.app.tempdir)  # left empty by Blender
     os._exit(code or 0)

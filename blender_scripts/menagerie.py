@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All our own shapes by name: see shapes.py for what a Shape is."""
+"""All Shapes by name; shapes.py explains them."""
 
 import functools
 
@@ -10,7 +10,7 @@ from shapes import Cone, Ellipsoid, Ring, RoundBox, Shape, build, mirrored, tube
 
 @functools.cache
 def hand():
-    """A left hand, palm towards -y, fingers up; genus 0, five parts close in space."""
+    """A left hand, palm towards -y, fingers up; genus 0, with fingers close to each other."""
     skin, nail = (0.66, 0.33, 0.20), (0.80, 0.50, 0.40)
     palm = [
         RoundBox((0.0, 0.0, 0.42), (0.36, 0.12, 0.38), 0.115),
@@ -61,7 +61,7 @@ class Cup(RoundBox):
 
 @functools.cache
 def chapel():
-    """A nave with buttresses and an apse, a tower with a spire, a dome: faces and curves of a building."""
+    """A building with planar and curved parts: a nave with buttresses and an apse, a tower, a dome."""
     wall, roof, dark = (0.70, 0.60, 0.44), (0.42, 0.12, 0.06), (0.05, 0.04, 0.05)
     nave = [
         RoundBox((0, 0.1, 0.36), (0.36, 0.62, 0.36), 0.03),
@@ -94,7 +94,7 @@ def slender_bar():
 
 @functools.cache
 def ring():
-    """A torus about the y axis: the simplest shape that rigid parts cannot unroll."""
+    """A torus about the y axis."""
     return build([Ring((0, 0, 0.8), 0.6, 0.2)], base=(0.10, 0.30, 0.55), cells=64)
 
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the documentation's pictures are stored: a rendered one takes a tenth of a PNG's bytes."""
+"""Stores pictures of the documentation, in a tenth of a PNG's size."""
 
 SUFFIX = ".webp"
 STORED = {"format": "WEBP", "quality": 95, "method": 6}
 
 
 def store(path):
-    """A PNG as a picture of the documentation, in its place; returns the new path."""
+    """Replaces a PNG by a picture in the documentation's format; returns its path."""
     from PIL import Image
 
     target = path.with_suffix(SUFFIX)

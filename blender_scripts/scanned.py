@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a scanner might make of another dog than ours: grey, rough, open below."""
+"""A simulated scan of another dog: grey, rough, open below."""
 
 import functools
 
@@ -12,7 +12,7 @@ ROUGHNESS = 0.0025
 
 @functools.cache
 def hound():
-    """A taller dog with a long muzzle, a deep chest and a tail that hangs in a curve; as it was scanned."""
+    """The scan of a taller dog with a long muzzle, a deep chest and a hanging tail."""
     body = tube([(0, -0.50, 0.90), (0, -0.05, 0.93), (0, 0.50, 0.95)], [0.31, 0.23, 0.21])
     head = [
         *tube([(0, -0.52, 0.98), (0, -0.70, 1.30)], [0.19, 0.14]),
@@ -39,7 +39,7 @@ def hound():
 
 
 def as_scanned(shape, seed=0):
-    """Without what faces the floor, and rough."""
+    """The shape with noise, without the faces towards the floor."""
     a, b, c = (shape.vertices[shape.triangles[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shapes of our own for pictures, the demo and tests: smooth unions of round cones, extracted from a grid.
+"""Shapes for pictures, the demo and tests: smooth unions of round cones, by marching cubes.
 
 Each shape is a function without arguments that returns a Shape: vertices (n,3), triangles (m,3)
-counter-clockwise from outside, colours (n,3). z is up, a shape looks towards -y and is about two units long.
-Needs NumPy and scikit-image, no Blender.
+counter-clockwise from outside, colours (n,3). z is up, a shape faces -y and is about two units long. Needs
+NumPy and scikit-image, no Blender.
 """
 
 from dataclasses import dataclass
@@ -20,14 +20,14 @@ class Shape(NamedTuple):
 
 @dataclass(frozen=True)
 class Cone:
-    """A ball of radius `ra` at `a` swept to one of radius `rb` at `b`."""
+    """A round cone: a ball of radius `ra` at `a` swept to radius `rb` at `b`."""
 
     a: tuple
     b: tuple
     ra: float
     rb: float
     colour: tuple | None = None
-    blend: float | None = None  # None: the shape's
+    blend: float | None = None  # None: that of the shape
 
     def distance(self, p):
         a, b = np.asarray(self.a, float), np.asarray(self.b, float)
@@ -102,7 +102,7 @@ def mirrored(parts):
 
 
 def smooth_union(parts, axes, blend):
-    """Polynomial smooth minimum on a grid, part after part, each only where it can matter."""
+    """Polynomial smooth minimum on a grid, part by part, each only near itself."""
     reach = 0.25
     values = np.full([len(axis) for axis in axes], reach)
     for part in parts:
@@ -121,7 +121,7 @@ def smooth_union(parts, axes, blend):
 
 
 def build(parts, blend=0.12, carve=(), paint=(), base=(0.7, 0.7, 0.7), cells=110, softness=0.018):
-    """The zero set of the smooth union less `carve`, coloured by the nearest parts and inside `paint`."""
+    """The zero set of the smooth union minus `carve`, coloured by the nearest parts and inside `paint`."""
     from skimage.measure import marching_cubes
 
     low, high = bounds(parts)
@@ -155,7 +155,7 @@ def bounds(parts, margin=0.06):
 
 
 def colours_at(parts, points, base, softness):
-    """A colour a point: nearest part's, faded over `softness`; uncoloured parts are `base`."""
+    """(n, 3) colours of points: of the nearest parts, blended over `softness`; `base` for parts without."""
     distances = np.stack([part.distance(points) for part in parts], 1)
     weights = np.exp(-(distances - distances.min(1, keepdims=True)) / softness)
     palette = np.array([base if part.colour is None else part.colour for part in parts])
@@ -163,7 +163,7 @@ def colours_at(parts, points, base, softness):
 
 
 def smooth_path(points, count):
-    """Catmull-Rom through the points, `count` points a span."""
+    """A Catmull-Rom spline through the points, with `count` points per span."""
     p = np.asarray([points[0], *points, points[-1]], float)
     t = np.linspace(0, 1, count, endpoint=False)[:, None]
     spans = [

@@ -5,7 +5,7 @@
     python blender_scripts/skin.py …          where bpy is installed
     blender --command arapfields skin …       where the extension is installed
 
-`--help` tells the flags; docs/command-line.md more.
+See `--help` and docs/command-line.md.
 """
 
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A photographer's table for results: backdrop, lights, camera, materials and coloured handle boxes."""
+"""A studio for renders: backdrop, lights, camera, materials and coloured handle boxes."""
 
 import math
 import os
@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-DRAFT = "STAGE_DRAFT" in os.environ  # smaller pictures of fewer rays, for trying a composition
+DRAFT = "STAGE_DRAFT" in os.environ  # smaller pictures with fewer samples, for drafts
 CLAY = (0.62, 0.60, 0.56)
 RESULT = (0.93, 0.55, 0.20)
 SURFACE = (0.30, 0.52, 0.75)
@@ -24,7 +24,7 @@ BOX_COLOURS = [
 
 
 def clear():
-    """Removes every object of the open file: the factory scene is not ours."""
+    """Removes all objects of the open file."""
     for item in list(bpy.data.objects):
         bpy.data.objects.remove(item, do_unlink=True)
 
@@ -90,7 +90,7 @@ def caption(text, location, size=0.22):
 
 
 def pin(place, anchor):
-    """A ball that stands for a pin, or a cube for an anchor."""
+    """A ball for a pin, or a cube for an anchor."""
     if anchor:
         bpy.ops.mesh.primitive_cube_add(size=0.09, location=place)
     else:
@@ -101,7 +101,7 @@ def pin(place, anchor):
 
 
 def bounds(objects, turn=None):
-    """Low and high corner of the world-space boxes of what is drawn; `turn`: (4, 4) taken off before."""
+    """Low and high corner of the objects' boxes in world space, after the inverse of `turn` (4, 4)."""
     back = (turn or Matrix.Identity(4)).inverted()
     corners = [back @ item.matrix_world @ Vector(c) for item in objects for c in item.bound_box]
     low = Vector(min(c[axis] for c in corners) for axis in range(3))
@@ -109,7 +109,7 @@ def bounds(objects, turn=None):
 
 
 def backdrop(floor_z, depth, width, turn):
-    """A floor that bends up into a wall behind +y, then turned: no horizon line in the picture."""
+    """A floor that curves up into a wall at +y, without a visible horizon, then rotated by `turn`."""
     radius, steps = 3.0, 24
     profile = (
         [(-40.0, 0.0)]
@@ -143,7 +143,7 @@ def look_at(eye, target):
 
 
 def outline(objects):
-    """World-space points (n,3) that a picture of the objects must hold: vertices, or a box's corners."""
+    """(n, 3) points in world space that a picture must contain: vertices, or corners of boxes."""
     points = []
     for item in objects:
         local = [v.co for v in item.data.vertices] if item.type == "MESH" else map(Vector, item.bound_box)
@@ -152,7 +152,7 @@ def outline(objects):
 
 
 def frame(camera, points, margin):
-    """Moves the camera without turning it until the points fill its width; returns height over width."""
+    """Translates the camera until the points fill its width; returns the aspect, height over width."""
     axes = np.array(camera.matrix_world.to_3x3())
     eye, half_width = np.array(camera.matrix_world.translation), math.tan(camera.data.angle / 2)
     for _ in range(30):
@@ -167,9 +167,9 @@ def frame(camera, points, margin):
 
 
 def set_up(objects, width=1200, samples=24, elevation=12.0, azimuth=0.0, threads=0, margin=0.025, around=()):
-    """Backdrop, lights and a camera that looks along +y and frames the objects; `azimuth` turns all three.
+    """Adds backdrop, lights and a camera along +y that frames the objects; `azimuth` rotates all of these.
 
-    `around`: further points to be in the picture; rows of a sheet that share them are drawn to one scale.
+    `around`: further points in the picture; rows of a sheet with the same points have the same scale.
     """
     bpy.context.view_layer.update()
     turn = Matrix.Rotation(math.radians(azimuth), 4, "Z")
@@ -185,7 +185,7 @@ def set_up(objects, width=1200, samples=24, elevation=12.0, azimuth=0.0, threads
         light(name, middle + turn @ (Vector(where) * span), middle, energy * span**2, size * span, colour)
 
     data = bpy.data.cameras.new("camera")
-    data.lens, data.sensor_fit = 70, "HORIZONTAL"  # the picture may be higher than wide
+    data.lens, data.sensor_fit = 70, "HORIZONTAL"  # also for pictures that are higher than wide
     camera = bpy.data.objects.new("camera", data)
     bpy.context.collection.objects.link(camera)
     a, e = math.radians(azimuth), math.radians(elevation)
@@ -208,27 +208,27 @@ def set_up(objects, width=1200, samples=24, elevation=12.0, azimuth=0.0, threads
         render.threads_mode, render.threads = "FIXED", threads
     scene.cycles.device, scene.cycles.samples = "CPU", 6 if DRAFT else samples
     scene.cycles.use_denoising = True
-    # The denoiser makes up for early stopping: by eye the same picture for two thirds of the time.
+    # With the denoiser, fewer samples give the same picture in two thirds of the time.
     scene.cycles.adaptive_threshold, scene.cycles.adaptive_min_samples = 0.1, 6
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 3, 2, 2
     scene.view_settings.view_transform, scene.view_settings.look = "Standard", "Medium High Contrast"
 
 
 def brighten(times):
-    """More light from everywhere: for one figure alone, whose wall is far away."""
+    """Brightens the world, for a figure whose wall is far away."""
     for data in list(bpy.data.lights):
         data.energy *= times
     bpy.context.scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value *= times
 
 
 def take(path):
-    """Renders what was set up as a PNG with Cycles."""
+    """Renders a PNG with Cycles."""
     render = bpy.context.scene.render
     render.filepath, render.image_settings.file_format = str(Path(path).resolve()), "PNG"
     bpy.ops.render.render(write_still=True)
 
 
 def photograph(objects, path, **options):
-    """A picture of the objects; the options are those of `set_up`."""
+    """Renders a picture of the objects, with options of `set_up`."""
     set_up(objects, **options)
     take(path)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well a shape took on a style, and whether it still stands: meshes with z up. Needs NumPy alone."""
+"""Measures of stylized meshes, z up: agreement with the style, and whether they still stand. Needs NumPy."""
 
 import numpy as np
 
-GROUND = 0.06  # share of the height below which a shape's feet begin
-LEAST_FOOT = 4  # vertices; fewer are a tip that the plane grazes
+GROUND = 0.06  # share of the height below which vertices belong to feet
+LEAST_FOOT = 4  # vertices; smaller parts are ignored
 
 
 def face_normals(vertices, triangles):
@@ -29,7 +29,7 @@ def enclosed(vertices, triangles):
 
 
 def tilt(rest, moved, triangles):
-    """Degrees by which the rotation closest to the motion, by area, leans the upright direction."""
+    """Degrees by which the closest rotation of the motion, weighted by area, tilts the z axis."""
     corners = face_normals(rest, triangles)[1] / 3
     weights = np.bincount(triangles.ravel(), np.repeat(corners, 3), len(rest))[:, None]
     arms, wanted = (p - (weights * p).sum(axis=0) / weights.sum() for p in (rest, moved))
@@ -39,7 +39,7 @@ def tilt(rest, moved, triangles):
 
 
 def feet(rest, triangles):
-    """Vertex numbers of each connected part below GROUND of the rest shape's height."""
+    """Vertex indices of each connected part below GROUND of the rest shape's height."""
     heights = rest[:, 2]
     low = heights < heights.min() + GROUND * np.ptp(heights)
     inside = triangles[low[triangles].all(axis=1)]
@@ -56,13 +56,13 @@ def feet(rest, triangles):
 
 
 def on_the_ground(rest, parts, slack=0.02):
-    """Those of the parts that stand on one plane: within a share of the height of its lowest point."""
+    """The parts whose lowest point is within a share of the height of the lowest of all."""
     low, height = rest[:, 2].min(), np.ptp(rest[:, 2])
     return [part for part in parts if rest[part, 2].min() < low + slack * height]
 
 
 def unevenness(vertices, parts, height):
-    """How far apart the feet's lowest points lie, as a share of the height; 0 of fewer than two."""
+    """Range of the heights of the feet's lowest points, as a share of the height; 0 for fewer than two."""
     if len(parts) < 2:
         return 0.0
     return float(np.ptp([vertices[part, 2].min() for part in parts]) / height)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws addon/icons/*.png, the pictures of the panel's styles: python blender_scripts/style_icons.py
+"""Draws addon/icons/*.png, the icons of styles: python blender_scripts/style_icons.py
 
-Each is the solid that its preferred normals bound, within a ball where they leave it open.
+Each shows the solid bounded by planes with the preferred normals, intersected with a ball.
 """
 
 from pathlib import Path
@@ -20,7 +20,7 @@ LIGHT = np.array([-0.45, 0.65, 0.62])
 
 
 def solid(normals, points, direction):
-    """Where rays enter {x: normals·x ≤ 1, |x| ≤ BALL}, as normals there; rows of NaN where they miss."""
+    """Normals at the points where rays enter {x: normals·x ≤ 1, |x| ≤ BALL}; NaN for rays that miss it."""
     along, offset = normals @ direction, points @ normals.T
     with np.errstate(divide="ignore", invalid="ignore"):
         times = (1.0 - offset) / along
@@ -40,7 +40,7 @@ def solid(normals, points, direction):
 
 
 def extent(normals, view):
-    """How far the solid reaches from the middle of the picture."""
+    """Largest distance of the solid from the center of the picture."""
     grid = np.linspace(-BALL, BALL, 81)
     x, y = (part.reshape(-1, 1) for part in np.meshgrid(grid, grid))
     seen = np.isfinite(solid(normals, x * view[0] + y * view[1] + 5.0 * view[2], -view[2])[:, 0])
@@ -48,7 +48,7 @@ def extent(normals, view):
 
 
 def picture(normals):
-    """(SIZE, SIZE, 4) bytes."""
+    """(SIZE, SIZE, 4) uint8 image of a style."""
     view = VIEW / np.linalg.norm(VIEW, axis=1, keepdims=True)
     count = SIZE * FINER
     width = 1.1 * extent(normals, view)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Turns the meshes of one file towards a style.
+"""Stylizes the meshes of one file.
 
     blender -b -P blender_scripts/stylize.py -- --input spot.ply --output cubic.ply --style cube
     python blender_scripts/stylize.py …          where bpy is installed
     blender --command arapfields stylize …       where the extension is installed
 
-`--help` tells the flags; docs/command-line.md more.
+See `--help` and docs/command-line.md.
 """
 
 import sys

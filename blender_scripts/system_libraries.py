@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes `import bpy` work on a machine without X11 and OpenGL libraries (a bare container, say).
 
-Where Blender's module misses system libraries and apt-get is at hand, their Debian packages are
-downloaded and unpacked beside the module; no root is needed and nothing outside the Python environment
-changes. Elsewhere it says what to install.
+If Blender's module lacks system libraries and there is apt-get, their Debian packages are downloaded and
+unpacked beside the module, without root and without changes outside the Python environment. Else the packages
+to install are named.
 """
 
 import importlib.util
@@ -37,13 +37,13 @@ PACKAGES = [
 
 
 def import_error():
-    """What the dynamic linker says when bpy is imported; empty when it works."""
+    """The dynamic linker's message when bpy is imported; empty on success."""
     result = subprocess.run([sys.executable, "-c", "import bpy"], capture_output=True, text=True)
     return "" if result.returncode == 0 else result.stderr.strip().splitlines()[-1]
 
 
 def unpack(target):
-    """Downloads the packages and puts their libraries into `target`, each finding the others there."""
+    """Downloads the packages, and copies their libraries to `target` with that as their search path."""
     with tempfile.TemporaryDirectory() as folder:
         user = ["-o", "APT::Sandbox::User=root"]
         available = [

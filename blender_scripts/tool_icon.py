@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws the pin tool's icon for the toolbar and the anchor of the list: python blender_scripts/tool_icon.py
+"""Draws the pin tool's toolbar icon and the list's anchor: python blender_scripts/tool_icon.py
 
-Blender reads coloured triangles: "VCO", a version, the size in both directions and two zeros, then two bytes
-for each corner's place (from the lower left), then four for its colour (red, green, blue, alpha).
+Blender's format is coloured triangles: "VCO", a version, width and height, two zeros, then two bytes for each
+corner's position (from the lower left), then four for its colour (red, green, blue, alpha).
 """
 
 import itertools
@@ -26,7 +26,7 @@ def disc(center, radii, colour, corners=28):
 
 
 def picture():
-    """A pin that stands on a bent sheet: [((corner, corner, corner), colour)], corners from 0 to 255."""
+    """A pin on a bent sheet: [((corner, corner, corner), colour)], coordinates from 0 to 255."""
     steps = [i / 16 for i in range(17)]
     sheet = [(20 + 215 * t, 52 + 46 * math.sin(math.pi * t)) for t in steps]
     found = []
@@ -38,7 +38,7 @@ def picture():
 
 
 def anchor(size=64):
-    """White strokes on nothing, as Blender's own icons are."""
+    """White strokes on a transparent background, as in Blender's icons."""
     image = Image.new("RGBA", (size, size))
     draw = ImageDraw.Draw(image)
     draw.ellipse((24, 3, 40, 19), outline=WHITE, width=5)

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A walk on the spot, as keys of three handles: two feet and the hips. All that is not held follows."""
+"""A walk in place, as keyframes of three handles: the feet and the hips."""
 
 import math
 
 import bpy
 from mathutils import Vector
 
-HANDLES = {  # place and half-extents
+HANDLES = {  # center and half extents
     "Foot.L": ((0.27, -0.02, 0.09), (0.17, 0.20, 0.10)),
     "Foot.R": ((-0.27, -0.02, 0.09), (0.17, 0.20, 0.10)),
     "Hips": ((0, 0.12, 0.80), (0.22, 0.24, 0.20)),
 }
-CYCLE, CYCLES = 24, 3  # frames of one, and how many: what swings takes one or two to repeat
+CYCLE, CYCLES = 24, 3  # frames per cycle; secondary motion is periodic after one or two
 LAST = CYCLE * CYCLES
-KEYS = 12  # a cycle
-STRIDE, LIFT = 0.20, 0.17  # half a step along y, and how high a foot goes
+KEYS = 12  # per cycle
+STRIDE, LIFT = 0.20, 0.17  # half a step along y, and the height of a raised foot
 
 
 def foot(phase):
@@ -28,14 +28,14 @@ def foot(phase):
 
 
 def hips(phase):
-    """They dip at each step, and turn and roll once a cycle."""
+    """(shift, rotation) of the hips: down at each step, yaw and roll once per cycle."""
     once, twice = 2 * math.pi * phase, 4 * math.pi * phase
     shift = Vector((0.05 * math.cos(once), 0, 0.045 * math.cos(twice) - 0.02))
     return shift, (0.05 * math.sin(twice), 0.08 * math.cos(once), 0.22 * math.sin(once))
 
 
 def set_keys(empties):
-    """Keys of CYCLES cycles from frame 1 on."""
+    """Inserts keyframes of CYCLES cycles from frame 1."""
     rest = {name: empty.location.copy() for name, empty in empties.items()}
     for number in range(KEYS * CYCLES + 1):
         frame, phase = 1 + number * CYCLE / KEYS, number / KEYS

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide's pictures of Blender's window, cut from what tests/gui/window.py saw.
+"""The guide's pictures of Blender's window, cropped from screenshots of tests/gui/window.py.
 
     python blender_scripts/window_pictures.py OUTPUT_OF_PANEL [OUTPUT_OF_JOBS_AND_LIVE] [--to docs/images]
 
 The folders are those of `window.py -- FOLDER panel` and `window.py -- FOLDER jobs live`, in a window of
-1600 × 1000. A section's picture ends where, compared with the closed panel, the next section's header lies.
+1600 × 1000. A section's picture ends at the next section's header, found by comparison with the closed panel.
 """
 
 import argparse
@@ -15,16 +15,16 @@ from pictures import STORED
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[1]
-# Of the sidebar's pictures, in pixels: tests/gui/panel.py presses the same rows.
-STEP, INNER = 28.4, 26.0  # from one closed section to the next, and within Advanced
-LEFT, WORDS = slice(0, 258), slice(8, 120)  # a section, and where its header has words
-HEADER = 22  # height of what is compared
-LAST, STATUS = 10, 72  # row of the section of the status, and its height with a line
+# Positions in the sidebar, in pixels: tests/gui/panel.py clicks the same rows.
+STEP, INNER = 28.4, 26.0  # distance of closed sections, and of those in Advanced
+LEFT, WORDS = slice(0, 258), slice(8, 120)  # columns of a section, and of its header's text
+HEADER = 22  # height of compared strips
+LAST, STATUS = 10, 72  # row of the status section, and its height with one line
 SHOWN = (1280, 800)
 TOP = ("source", "handles", "deform", "stylize")
 WITHIN = ("surface", "result")
 WINDOW = ("handles", "running", "cancelled", "live")  # blender-NAME.webp
-MENU = (940, 167, 1284, 411)  # the menu of styles and the header of its section
+MENU = (940, 167, 1284, 411)  # the menu of styles with its section's header
 
 
 def pixels(path):
@@ -32,7 +32,7 @@ def pixels(path):
 
 
 def found(strip, picture):
-    """The row of a picture where a strip lies, by its words."""
+    """The row of a picture at which a strip is found, by its text."""
     rows = range(picture.shape[0] - len(strip))
     off = [np.abs(picture[row : row + len(strip), WORDS] - strip[:, WORDS]).mean() for row in rows]
     row = int(np.argmin(off))
@@ -42,7 +42,7 @@ def found(strip, picture):
 
 
 def next_header(closed, row, step, beginning):
-    """The strip of the header below a row of the closed panel."""
+    """The strip of the next header below a row of the closed panel."""
     top = round(beginning + step * (row + 1)) + 2
     return closed[top : top + HEADER]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A film of a Blender 5.2 that has a window, in a system of its own that is entered by chroot.
+"""Films Blender 5.2 in a window, in another root file system, by chroot.
 
 ARAPFIELDS_BLENDER52 names its root folder (default /opt/blender52), with Blender, Xvfb, xdotool and
 ImageMagick inside; the native library comes from the extension in dist.
@@ -14,10 +14,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 CHROOT = Path(os.environ.get("ARAPFIELDS_BLENDER52", "/opt/blender52"))
-PROJECT = ("addon", "native/options", "tests/gui", "tests/support")  # what runs in there
+PROJECT = ("addon", "native/options", "tests/gui", "tests/support")  # copied into it
 SCRIPTS = [ROOT / "tests/gui" / name for name in ("film.py", "mouse.py", "stage.py", "window.py")]
 SIZE = (880, 620)  # pixels of the window
-PATIENCE = 900  # seconds, for a busy machine
+PATIENCE = 900  # seconds; long enough for a busy machine
 SESSION = """
 export LIBGL_ALWAYS_SOFTWARE=1 DISPLAY=:97 HOME={0}/home PYTHONPATH={0}/site PYTHONDONTWRITEBYTECODE=1
 mkdir -p $HOME
@@ -32,20 +32,20 @@ exit $status
 
 
 def extension():
-    """The newest zip for this system; None where there is none."""
+    """The newest zip for this system; None without one."""
     found = sorted((ROOT / "dist").glob("arapfields-*-linux-x64.zip"), key=lambda path: path.stat().st_mtime)
     return found[-1] if found else None
 
 
 def missing():
-    """What a film lacks, in one line; None where it can be made."""
+    """A line that names a missing requirement; None if films can be made."""
     if os.geteuid() or not (CHROOT / "usr/bin/blender").exists():
         return f"no Blender with a window in {CHROOT}, or no right to enter it"
     return None if extension() else "no extension in dist (make extension)"
 
 
 def unpack(target):
-    """The wheels of the extension, as a folder to import from."""
+    """Unpacks the extension's wheels to a folder to import from."""
     with zipfile.ZipFile(extension()) as outer:
         for name in outer.namelist():
             if name.endswith(".whl"):
@@ -53,7 +53,7 @@ def unpack(target):
 
 
 def record(scene, folder):
-    """Runs the film of tests/gui on a .blend; its pictures and film.json come to a folder that is made."""
+    """Runs the film of tests/gui on a .blend; pictures and film.json are written to a new folder."""
     there = CHROOT / "tmp" / f"arapfields-film-{os.getpid()}"
     shutil.rmtree(there, ignore_errors=True)
     there.mkdir(parents=True)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What build_extension.py is made of: a zip, its guide, its check."""
+"""Parts of build_extension.py: the zip, its guide, its check."""

@@ -5,9 +5,9 @@ import re
 import tomllib
 import zipfile
 
-OPTIONS = "core/settings/options.json"  # where addon/core/settings/parameters.py looks for it
-RUN = ("linux-x64", "windows-x64")  # the others' manifests say that they were not run yet
-TIMESTAMP = (2020, 1, 1, 0, 0, 0)  # archives of the same content are the same bytes
+OPTIONS = "core/settings/options.json"  # read by addon/core/settings/parameters.py
+RUN = ("linux-x64", "windows-x64")  # the manifests of the others say that they are untested
+TIMESTAMP = (2020, 1, 1, 0, 0, 0)  # for reproducible archives
 
 
 def entry(name, method=zipfile.ZIP_DEFLATED):
@@ -22,7 +22,7 @@ def read_manifest(addon):
 
 
 def addon_files(addon):
-    """Archive name → path of everything of the add-on that ships, but the manifest."""
+    """{archive name: path} of all shipped files of the add-on except the manifest."""
     kept = [path for path in sorted(addon.rglob("*")) if path.is_file() and "__pycache__" not in path.parts]
     names = {str(path.relative_to(addon)): path for path in kept}
     names.pop("blender_manifest.toml")
@@ -30,20 +30,20 @@ def addon_files(addon):
 
 
 def manifest_text(text, platform, wheels):
-    """The manifest's text for one platform and its wheels."""
+    """The manifest for one platform and its wheels."""
     text = re.sub(r"^platforms = .*$", f'platforms = ["{platform}"]', text, flags=re.M)
     if platform not in RUN:
         text = re.sub(r'^(tagline = ".*)"$', r'\1 (not yet run)"', text, flags=re.M)
-    # Keys after a table would belong to it: the wheels go before the first one.
+    # Keys after a table belong to it: the wheels are inserted before the first table.
     head, table, tail = text.partition("\n[")
     lines = "".join(f'  "./wheels/{wheel.name}",\n' for wheel in wheels)
     return f"{head}\nwheels = [\n{lines}]\n{table}{tail}"
 
 
 def write_extension(addon, wheels, licence, guide, path, platform):
-    """Writes the extension's zip to `path`; `guide` is the user's guide, archive name → bytes.
+    """Writes the extension's zip to `path`; `guide`: {archive name: content} of the user's guide.
 
-    The first wheel's options.json makes the panel. Wheels, compressed already, are stored as they are.
+    options.json is taken from the first wheel. Wheels are stored, as they are compressed.
     """
     manifest = manifest_text((addon / "blender_manifest.toml").read_text(), platform, wheels)
     tomllib.loads(manifest)

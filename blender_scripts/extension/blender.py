@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's own extension tool, run by the bpy of this environment in a process of its own."""
+"""Blender's extension tool, run in a separate process by this environment's bpy."""
 
 import subprocess
 import sys
@@ -12,7 +12,7 @@ sys.exit(bl_extension_cli.cli_extension_handler(sys.argv[1:]))
 
 
 def extension_tool(*arguments):
-    """Runs `blender --command extension …`; RuntimeError with what it says when it refuses."""
+    """Runs `blender --command extension …`; RuntimeError with its output if it fails."""
     command = [sys.executable, "-c", CODE, *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a finished zip must hold; read from the zip itself, not from what was meant to go into it."""
+"""Checks the content of a finished zip."""
 
 import tomllib
 import zipfile
@@ -12,9 +12,9 @@ PARTS = {"blender_manifest.toml", "__init__.py", "LICENSE", OPTIONS, "guide/inde
 
 
 def check_zip(path, wheels):
-    """RuntimeError unless the zip is small and whole, and its wheels are these files, byte for byte.
+    """RuntimeError if the zip is too large or incomplete, or its wheels differ from these files.
 
-    Blender itself would take a zip without native code.
+    Blender accepts a zip without native code.
     """
     with zipfile.ZipFile(path) as archive:
         names = set(archive.namelist())

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The user's guide as pages of HTML, for the extension's zip: what a right click in Blender opens."""
+"""The user's guide as HTML pages in the extension's zip, opened from Blender's context menus."""
 
 import importlib.util
 import io
 import re
 from pathlib import Path
 
-FOLDER = "guide"  # in the extension; addon/blender/guide.py looks for it there
+FOLDER = "guide"  # in the extension; read by addon/blender/guide.py
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{title} · ARAP Fields</title>
 <style>body {{ font: 16px/1.5 sans-serif; max-width: 50em; margin: 2em auto; padding: 0 1em }}
@@ -20,7 +20,7 @@ LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 
 
 def option_tables(docs):
-    """The documentation's hook that fills in the tables of options."""
+    """The documentation's hook that inserts tables of options."""
     spec = importlib.util.spec_from_file_location("guide_options", docs / "hooks" / "options.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -28,9 +28,9 @@ def option_tables(docs):
 
 
 def guide_files(docs):
-    """Archive name → bytes of every page of docs/guide and of the pictures in them.
+    """{archive name: content} of all pages of docs/guide and their pictures.
 
-    Links to what does not ship become plain text.
+    Links to files that are not shipped become plain text.
     """
     import markdown
 
@@ -64,7 +64,7 @@ def guide_files(docs):
 
 
 def small(picture):
-    """The bytes of a picture as WebP, an eighth of a PNG."""
+    """The bytes of a picture as WebP, an eighth of a PNG's size."""
     from PIL import Image
 
     content = io.BytesIO()

@@ -23,7 +23,7 @@ STUBS = "python/arapfields/_native.pyi"
 
 
 def stubs():
-    """A _native.pyi that a build for this system wrote of the bindings as they are."""
+    """An up-to-date _native.pyi, written by a build for this system."""
     newest = max(path.stat().st_mtime for path in (ROOT / "native/bindings").iterdir())
     found = [ROOT / build / STUBS for build in ("build/linux-x64", "build/eigen", "build/wheel")]
     for path in found:
@@ -38,7 +38,7 @@ def module_name(version):
 
 
 def settings(platform, build):
-    """CMake's definitions of a platform's build, which makes the modules of all Pythons."""
+    """CMake definitions of a platform's build, with the modules for all Pythons."""
     (build / "tools").mkdir(parents=True, exist_ok=True)
     modules = []
     for version in PYTHONS:
@@ -52,7 +52,7 @@ def settings(platform, build):
 
 
 def build_wheels(platform, output):
-    """The platform's wheels in `output`, checked; their paths."""
+    """Builds and checks the platform's wheels in `output`; returns their paths."""
     build = WORK / platform.name
     targets = [*map(module_name, PYTHONS), "stubs"]
     options = [f"build-dir={build}", "install.strip=false", f"build.targets={';'.join(targets)}"]
@@ -80,7 +80,7 @@ def build_wheels(platform, output):
 
 
 def pack(wheel):
-    """Compresses a wheel's files as far as it goes: an extension holds three wheels within its limit."""
+    """Compresses a wheel to the maximum: three wheels must fit into an extension's size limit."""
     with zipfile.ZipFile(wheel) as archive:
         files = [(info, archive.read(info)) for info in archive.infolist()]
     with zipfile.ZipFile(wheel, "w") as archive:
@@ -89,7 +89,7 @@ def pack(wheel):
 
 
 def environment():
-    """With this Python's own tools, such as ninja, first."""
+    """Environment variables with this Python's tools, such as ninja, first in PATH."""
     own = str(Path(sys.executable).parent)
     return {**os.environ, "PATH": f"{own}{os.pathsep}{os.environ['PATH']}"}
 

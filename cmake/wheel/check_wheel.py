@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is wrong with a wheel, by its tags and by what its libraries ask for; read from the wheel by LIEF.
+"""Checks wheels: their tags, and the dependencies of their libraries, which are read by LIEF.
 
 python cmake/wheel/check_wheel.py dist/*.whl
 """
@@ -21,7 +21,7 @@ from platforms import GLIBC, MACOS, PLATFORMS, declared, zig_library
 
 LIMIT = 10e6  # bytes
 PARTS = ("__init__.py", "py.typed", "_native.pyi", "options.json")
-KERNELS = {"x64": (b"baseline", b"avx2", b"avx512"), "arm64": (b"neon",)}  # as compiled_for() names them
+KERNELS = {"x64": (b"baseline", b"avx2", b"avx512"), "arm64": (b"neon",)}  # names by compiled_for()
 MACHINES = {
     ("linux", "x64"): lief.ELF.ARCH.X86_64,
     ("linux", "arm64"): lief.ELF.ARCH.AARCH64,
@@ -30,16 +30,16 @@ MACHINES = {
     ("macos", "x64"): lief.MachO.Header.CPU_TYPE.X86_64,
     ("macos", "arm64"): lief.MachO.Header.CPU_TYPE.ARM64,
 }
-SYSTEM = {  # libraries that every system of its kind has
+SYSTEM = {  # libraries of every such system
     "linux": r"ld-linux\S*|lib(c|m|dl|rt|pthread|gcc_s|stdc\+\+)\.so\.\d+",
     "windows": r"(kernel32|ntdll|msvcrt|advapi32|shell32|bcrypt|bcryptprimitives|ws2_32|api-ms-win-\S+)\.dll",
-    "macos": r"/usr/lib/libSystem\.B\.dylib|@rpath/_native\.so",  # the second: its own name
+    "macos": r"/usr/lib/libSystem\.B\.dylib|@rpath/_native\.so",  # the second is its install name
 }
 NEWEST = {"GLIBC": GLIBC, "GLIBCXX": (3, 4, 25), "CXXABI": (1, 3, 11), "GCC": (7, 0, 0)}  # manylinux_2_28
 
 
 class Wheel:
-    """One wheel, its platform and what is wrong with it."""
+    """A wheel, its platform and its problems."""
 
     def __init__(self, path):
         self.path, self.problems = Path(path), []
@@ -138,21 +138,19 @@ class Wheel:
                 self.check_symbol(name, symbol.name.removeprefix("_"))
         (content,) = [data for file, data in self.files.items() if Path(file).name == name]
         said = signature_problem(content, image)
-        if said and (
-            image.has_code_signature or self.platform.name == "macos-arm64"
-        ):  # Intel's asks for none
+        if said and (image.has_code_signature or self.platform.name == "macos-arm64"):  # not for Intel
             self.complain(f"{name} {said}")
 
 
 def exported(library):
-    """The names of a library's symbols for others."""
+    """The names of a library's exported symbols."""
     if isinstance(library, lief.PE.Binary):
         return {entry.name for entry in library.get_export().entries}
     return {symbol.name for symbol in library.dynamic_symbols if symbol.shndx} if library else set()
 
 
 def system_symbols(processor):
-    """libSystem's symbols by ziglang's list, with the underscore that C names have."""
+    """libSystem's symbols by ziglang's list, with C's underscore."""
     text = (zig_library() / "libc/darwin/libSystem.tbd").read_text()
     wanted, found = {"x64": "x86_64-macos", "arm64": "arm64e-macos"}[processor], set()
     for targets, body in re.findall(r"- targets:\s*\[([^\]]*)\]\s*((?:\s*[\w-]+:\s*\[[^\]]*\])+)", text):
@@ -163,7 +161,7 @@ def system_symbols(processor):
 
 
 def signature_problem(data, image):
-    """What is wrong with a Mach-O file's ad-hoc signature (<kern/cs_blobs.h>): hashes are recomputed."""
+    """The problem of a Mach-O file's ad-hoc signature (<kern/cs_blobs.h>), if any; recomputes hashes."""
     if not image.has_code_signature:
         return "is not signed"
     limit = image.code_signature.data_offset

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Libraries to link against in place of the system's, so that what is linked runs with an older glibc.
+"""Stub libraries to link against instead of the system's, for binaries that run with an older glibc.
 
-The compiler is the system's; what it links against are stubs: glibc's of the wanted version, for which
-ziglang has the lists of symbols, and libstdc++'s without the symbols that are newer than the manylinux tag
-allows. What libstdc++ lacks then comes from its static archive, as in the manylinux containers.
+The system's compiler links against stubs: glibc of the wanted version, by ziglang's lists of symbols, and
+libstdc++ without symbols that are newer than the manylinux tag allows. Missing symbols of libstdc++ are taken
+from its static archive, as in the manylinux containers.
 """
 
 import os
@@ -12,10 +12,10 @@ from pathlib import Path
 
 from platforms import run, zig
 
-NEWEST = {"GLIBCXX_3.4": 25, "CXXABI_1.3": 11}  # the last numbers that manylinux_2_28 allows, of GCC 8
+NEWEST = {"GLIBCXX_3.4": 25, "CXXABI_1.3": 11}  # the newest versions that manylinux_2_28 allows, of GCC 8
 GLIBC = ["libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "librt.so.1"]
-# What headers of newer glibc name and older libraries lack: a process never counts as having one thread, stat
-# and its kin go by their older names, and locks wait by the clock of the day.
+# Functions that headers of newer glibc use and older libraries lack: processes count as multi-threaded, stat
+# and the like have their older names, and timed locks use the real-time clock.
 COMPATIBLE = """
 #define _GNU_SOURCE
 #include <pthread.h>
@@ -48,7 +48,7 @@ HIDDEN int pthread_mutex_clocklock(pthread_mutex_t *mutex, clockid_t clock, cons
 
 
 def compiler_file(compiler, name):
-    """The path of a file that the compiler links with."""
+    """The path of a library file of the compiler."""
     path = Path(run(compiler, f"-print-file-name={name}").strip())
     if not path.is_absolute():
         raise RuntimeError(f"the compiler has no {name}")
@@ -56,7 +56,7 @@ def compiler_file(compiler, name):
 
 
 def glibc_stubs(target, folder):
-    """ziglang makes stubs of its lists of symbols when it links a program."""
+    """The stubs of glibc, which ziglang makes when it links a program."""
     cache = folder / "zig"
     (folder / "empty.c").write_text("int main(void) { return 0; }\n")
     environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
@@ -74,7 +74,7 @@ def allowed(version):
 
 
 def cxx_symbols(library):
-    """(name, kind, version) of the default definitions of a libstdc++ that are old enough."""
+    """Yields (name, kind, version) of the default symbols of libstdc++ with an allowed version."""
     for line in run("readelf", "--dyn-syms", "-W", library).splitlines():
         found = re.match(r"\s*\d+:\s+\w+\s+\w+\s+(FUNC|OBJECT|TLS)\s+\S+\s+\S+\s+\d+\s+(\S+?)@@(\S+)$", line)
         if found and allowed(found[3]):
@@ -82,7 +82,7 @@ def cxx_symbols(library):
 
 
 def cxx_stub(compiler, folder):
-    """libstdc++.so.6 with those alone."""
+    """A stub libstdc++.so.6 with the allowed symbols."""
     source, script, versions = [".text"], [], {}
     for name, kind, version in cxx_symbols(compiler_file(compiler, "libstdc++.so")):
         versions.setdefault(version, []).append(name)
@@ -105,13 +105,13 @@ def cxx_stub(compiler, folder):
 
 
 def link_flags(platform, version, folder):
-    """CMake definitions that link against glibc `version`, (major, minor), with stubs made in `folder`."""
+    """CMake definitions to link against glibc `version`, (major, minor), by stubs made in `folder`."""
     compiler = platform.compiler
     (folder / "compatible.c").write_text(COMPATIBLE)
     run(compiler, "-x", "c", "-O2", "-fPIC", "-c", folder / "compatible.c", "-o", folder / "compatible.o")
     glibc = glibc_stubs("{}.{}.{}".format(platform.target, *version), folder)
     libraries = [cxx_stub(compiler, folder), compiler_file(compiler, "libstdc++.a"), *glibc]
-    # The last: what is linked into each library even of glibc, such as atexit.
+    # The last: functions of glibc that are linked statically into each library, such as atexit.
     libraries += [compiler_file(compiler, "libgcc_s.so.1"), folder / "compatible.o", *glibc[:2]]
     libraries += [compiler_file(compiler, name) for name in ("libgcc.a", "libc_nonshared.a")]
     flags = "-nodefaultlibs -s -Wl,--exclude-libs,ALL -Wl,--as-needed"

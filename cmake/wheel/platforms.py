@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The platforms that wheels are built for, each by compilers that run on Linux."""
+"""The platforms of wheels, with cross compilers on Linux."""
 
 import re
 import shlex
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PYTHONS = [(3, 11), (3, 13), (3, 14)]  # of the Blenders that the extension's manifest admits
+PYTHONS = [(3, 11), (3, 13), (3, 14)]  # of the Blender versions that the extension supports
 GLIBC = (2, 28)
 MACOS = (11, 0)
 ONE_MODULE = {"ARAPFIELDS_ONE_MODULE": "ON"}
@@ -18,14 +18,14 @@ ONE_MODULE = {"ARAPFIELDS_ONE_MODULE": "ON"}
 
 @dataclass(frozen=True)
 class Platform:
-    """One of Blender's platforms; `compiler` is GCC's for it, or "zig", which calls it `target`.
+    """A platform of Blender; `compiler`: its GCC, or "zig" with this `target`.
 
-    `library` is the library's file; where there is none, it lies inside each Python's module.
+    `library`: the library's file; without one, the library is linked into each Python's module.
     """
 
     name: str
     tag: str
-    suffix: str  # of the bindings' module, after cp311's digits
+    suffix: str  # of the module's file, after "cp311"
     compiler: str
     target: str
     library: str = ""
@@ -36,11 +36,11 @@ class Platform:
 
     @property
     def wheels(self):
-        """The Pythons of each wheel: one serves all where the library has a file of its own."""
+        """The Pythons of each wheel: one wheel for all if the library is a separate file."""
         return [PYTHONS] if self.library else [[version] for version in PYTHONS]
 
     def wheel_tags(self, pythons):
-        """The end of a wheel's name."""
+        """The tags in a wheel's file name."""
         served = ".".join(map("cp{0[0]}{0[1]}".format, pythons))
         return f"{served}-{served}-{self.tag}"
 
@@ -95,7 +95,7 @@ PLATFORMS = {
 
 
 def run(*command, **keywords):
-    """What a command prints; RuntimeError with the end of what it says where it fails."""
+    """The output of a command; RuntimeError with the end of its output if it fails."""
     done = subprocess.run([str(part) for part in command], capture_output=True, text=True, **keywords)
     if done.returncode:
         raise RuntimeError(f"{command[0]}: {(done.stdout + done.stderr).strip()[-4000:]}")
@@ -113,15 +113,15 @@ def zig_library():
 
 
 def definitions(platform, work):
-    """CMake's for the platform, with the tools that they name made in `work`."""
+    """CMake definitions of the platform; tools that they refer to are made in `work`."""
     found = {"linux": linux, "windows": windows, "macos": macos}[platform.system](platform, work)
     if platform.compiler == "zig":
-        script = work / "clang++"  # the name by which CMake and ccache know its kind
+        script = work / "clang++"  # by this name CMake and ccache recognize it
         script.write_text(f'#!/bin/sh\nexec {shlex.join(zig("c++", "-target", platform.target))} "$@"\n')
         script.chmod(0o755)
         found["CMAKE_CXX_COMPILER"] = script
         found["CMAKE_MODULE_LINKER_FLAGS"] = "-s"
-        # Options that GCC alone has.
+        # Options of GCC.
         found["CMAKE_CXX_FLAGS"] = "-Wno-unused-command-line-argument -Wno-unknown-warning-option"
     elif not shutil.which(platform.compiler):
         package = platform.compiler.replace("x86_64-w64-mingw32-g++", "g++-mingw-w64-x86-64")
@@ -146,7 +146,7 @@ def windows(platform, work):
 
 def macos(platform, work):
     processor = "arm64" if platform.name == "macos-arm64" else "x86_64"
-    # Nothing is to rename.
+    # No install name to change.
     return ONE_MODULE | cross("Darwin", processor) | {"CMAKE_INSTALL_NAME_TOOL": "/bin/true"}
 
 
@@ -155,7 +155,7 @@ def cross(system, processor):
 
 
 def python_library(platform, version, headers, work):
-    """What Windows' linker asks for: a library that tells what the Python's DLL has; none elsewhere."""
+    """The import library of a Python's DLL, for the linker of Windows; "" for other systems."""
     if platform.system != "windows":
         return ""
     name = "python{}{}".format(*version)
@@ -173,6 +173,6 @@ DECLARED = re.compile(r"PyAPI_(FUNC|DATA)\((?:[^()]|\([^()]*\))*\)\s*(?:\w+\s+)*
 
 
 def declared(headers):
-    """{name: FUNC or DATA} of what the headers of a Python say that it offers."""
+    """{name: FUNC or DATA} of the symbols declared in a Python's headers."""
     texts = (path.read_text(errors="replace") for path in Path(headers).rglob("*.h"))
     return {name: kind for text in texts for kind, name in DECLARED.findall(text)}

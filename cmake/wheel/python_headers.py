@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Headers of the Pythons that Blenders ship: this system's, else from Debian's packages.
+"""Headers of the Pythons of Blender's versions: this system's, else from Debian's packages.
 
-These are downloaded by apt-get into a folder of their own, with lists of packages of their own: no root is
-needed and nothing of the system changes.
+Packages are downloaded by apt-get to a separate folder with separate package lists, without root and without
+changes to the system.
 """
 
 import re
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from platforms import ROOT, run
 
-RELEASES = {(3, 11): "bookworm", (3, 13): "trixie", (3, 14): "sid"}  # Debian's, that have that Python
+RELEASES = {(3, 11): "bookworm", (3, 13): "trixie", (3, 14): "sid"}  # Debian releases with that Python
 KEYRING = "/usr/share/keyrings/debian-archive-keyring.gpg"
 FETCHED = ROOT / "build/python-headers"
 SEARCHED = [
@@ -25,7 +25,7 @@ SEARCHED = [
 
 
 def header_version(folder):
-    """(major, minor) that the Python.h in `folder` belongs to, or None."""
+    """(major, minor) of the Python.h in `folder`, or None."""
     patchlevel = Path(folder) / "patchlevel.h"
     if not (Path(folder) / "Python.h").exists() or not patchlevel.exists():
         return None
@@ -33,7 +33,7 @@ def header_version(folder):
 
 
 def at_hand(version):
-    """The folder of a Python's headers, or None."""
+    """The folder of a Python's headers on this system, or None."""
     for pattern in SEARCHED:
         for folder in sorted(Path("/").glob(f"{pattern.lstrip('/')}/python{version[0]}.{version[1]}")):
             if header_version(folder) == version:
@@ -42,7 +42,7 @@ def at_hand(version):
 
 
 def headers(version, work):
-    """A copy of a Python's headers in `work`, with the pyconfig.h that serves every platform; its path."""
+    """Copies a Python's headers to `work`, with a pyconfig.h for all platforms; returns the path."""
     source = at_hand(version) or fetch(version)
     copy = Path(work) / source.name
     if not copy.is_dir():
@@ -65,7 +65,7 @@ def mirror():
 
 
 def options(release, state):
-    """apt-get's arguments for a state of its own, with one release as its only source."""
+    """Arguments of apt-get for a separate state folder, with one release as its source."""
     for folder in ("lists/partial", "cache/archives/partial", "parts"):
         (state / folder).mkdir(parents=True, exist_ok=True)
     source = state / "sources.list"
@@ -83,7 +83,7 @@ def options(release, state):
 
 
 def fetch(version):
-    """Unpacks the headers of one Python below FETCHED; their folder."""
+    """Downloads and unpacks the headers of a Python to FETCHED; returns their folder."""
     package = "libpython{}.{}-dev".format(*version)
     folder = FETCHED / RELEASES[version]
     settings = options(RELEASES[version], folder / "apt")

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Completes what is published, beside wheels and zips that are there: the source distribution, a repository's
-index.json, the licences and the checksums.
+"""Completes a release of wheels and zips: source distribution, index.json, licences, checksums.
 
 python cmake/wheel/release.py --output dist
 """
@@ -18,7 +17,7 @@ from platforms import ROOT, run  # noqa: E402
 
 
 def build_sdist(output):
-    """Of the files that git knows, in a folder of their own: the build tool would look through .venv too."""
+    """Builds the source distribution from a copy of the files in git: the build tool would search .venv."""
     tree = ROOT / "build/sdist"
     shutil.rmtree(tree, ignore_errors=True)
     for name in run("git", "-C", ROOT, "ls-files", "-z").split("\0"):
@@ -31,7 +30,7 @@ def build_sdist(output):
 
 
 def complete(output):
-    """The files that were added."""
+    """Adds the further files; returns them."""
     source = build_sdist(output)
     run(sys.executable, "-m", "twine", "check", "--strict", source, *output.glob("arapfields-*.whl"))
     extension_tool("server-generate", f"--repo-dir={output}", "--html")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws docs/images/architecture.svg from the includes that are in the code: python docs/hooks/diagram.py
+"""Draws docs/images/architecture.svg from the code's includes: python docs/hooks/diagram.py
 
-tests/docs checks that the picture is the one that the code of today gives.
+tests/docs checks that the picture is up to date.
 """
 
 import html
@@ -32,14 +32,14 @@ INK, LINE = "#1f2937", "#94a3b8"
 
 
 def pipeline():
-    """The native folders but those under all, in the order in which CMake lists them."""
+    """The native folders in CMake's order, without those that all others include."""
     text = (ROOT / "native" / "CMakeLists.txt").read_text()
     listed = re.search(r"foreach\(folder ([^)]*)\)", text)[1].split()
     return [folder for folder in listed if folder not in UNDER_ALL and "/" not in folder]
 
 
 def includes():
-    """The pairs (from, to) of folders one of whose files includes a header of the other."""
+    """The pairs (from, to) of folders with an include between their files."""
     found = set()
     for folder in [*pipeline(), *UNDER_ALL]:
         for path in sorted((ROOT / "native" / folder).rglob("*.*")):
@@ -69,7 +69,7 @@ def box(x, y, width, height, title, note="", fill="#f8fafc"):
 
 
 def arc(start, end):
-    """From the including folder back to the included one, over the boxes."""
+    """An arc above the boxes, from the including to the included folder."""
     lift = 22 + 24 * abs(start - end) / STEP
     return (
         f'<path d="M{start} {TOP}C{start} {TOP - lift:.0f} {end} {TOP - lift:.0f} {end} {TOP - 3}" '

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Formulas between dollar signs become MathML while the site is built: nothing is fetched when it is read."""
+"""Converts formulas between dollar signs to MathML when the site is built."""
 
 import html
 import re

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of the public C++ headers, each with its comment and what it exports, for `<!-- headers -->`."""
+"""Lists the public C++ headers with their comments and exported names, at `<!-- headers -->`."""
 
 import re
 from pathlib import Path
@@ -20,7 +20,7 @@ def listed():
         about = " ".join(re.findall(r"^// (?!SPDX)(.*)", text, re.M)).partition(": ")[0].rstrip(".")
         names = {}
         for name in re.findall(r'^#include "([\w/]+\.h)"', text, re.M):
-            if (NATIVE / name).exists():  # not those of options, which the build writes
+            if (NATIVE / name).exists():  # without the options' headers, which are generated
                 found = EXPORTED.findall((NATIVE / name).read_text(encoding="utf-8"))
                 names |= dict.fromkeys(f"`{one or other}`" for one, other in found)
         rows.append(f"- `arapfields/{path.name}`: {about}{': ' if names else ''}{', '.join(names)}")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Puts figures that commands measured into the pages: python docs/hooks/measured.py
+"""Inserts measured figures into the pages: python docs/hooks/measured.py
 
-In a page, <!-- NAME -->…<!-- end --> holds what NAME below says (tested) of docs/gallery/manifest.json, which
-`make gallery` writes, or of the tables of docs/performance.md, which `make bench` fills.
+In a page, <!-- NAME -->…<!-- end --> contains the text of the function NAME below (tested) from
+docs/gallery/manifest.json, written by `make gallery`, or tables of docs/performance.md, by `make bench`.
 """
 
 import json
@@ -15,7 +15,7 @@ MARKED = re.compile(r"(<!-- (\w+) -->).*?(<!-- end -->)", re.S)
 
 
 def span(rows, key, digits):
-    """'least to largest' of a figure over the rows."""
+    """'minimum to maximum' of a figure over the rows."""
     values = [row[key] for row in rows.values()]
     return f"{min(values):.{digits}f} to {max(values):.{digits}f}"
 
@@ -80,7 +80,7 @@ def styles(m):
 
 
 def sheet(m):
-    standing = [row for name, row in m.items() if not name.startswith("suzanne")]  # she has no feet
+    standing = [row for name, row in m.items() if not name.startswith("suzanne")]  # without feet
     fine = [row for name, row in m.items() if name.endswith(("dodecahedron", "icosahedron"))]
     lean, apart = (max(row[key] for row in standing) for key in ("tilt", "unevenness"))
     grown = min(row["share"] / row["share_rest"] for row in fine)
@@ -109,7 +109,7 @@ def median(m):
 
 
 def table_rows(start):
-    """Cells of the rows of docs/performance.md whose first cell, or the last one above it, begins so."""
+    """Cells of rows of docs/performance.md whose first cell, or the last one above, begins with `start`."""
     found, first = [], ""
     for line in (DOCS / "performance.md").read_text().splitlines():
         cells = [cell.strip() for cell in line.split("|")[1:-1]] or [""]
@@ -124,13 +124,13 @@ def faster():
 
 
 def fingers():
-    """Of the neighbours of a finger that is bent, by field."""
+    """Motion of the neighbours of a bent finger, by field."""
     shares = [float(row[i]) for row in table_rows("middle forward 20 degrees") for i in (4, 6)]
     return f"{min(shares):.1f} to {max(shares):.1f} %"
 
 
 def beside(start, further=""):
-    """A sentence for ours and one for implicit-arap: the rows of docs/peers.json whose problem begins so."""
+    """A sentence for this library and one for implicit-arap, from docs/peers.json by the problem's start."""
     rows = json.loads((DOCS / "peers.json").read_text())["rows"]
     sentences = []
     for by, shown in (("ours, default", "Ours"), ("implicit-arap", "implicit-arap")):
@@ -160,13 +160,13 @@ FIGURE = {
     "inverted": "inverse",
     "cubes": "styles",
     "sheet": "style_sheet",
-}  # whose figures they tell, where not their own name's
+}  # {text: figure}, if the names differ
 TEXTS = [hero, bending, deformations, exact, inverse, inverted, styles, cubes, sheet, live, median]
-OTHERS = [faster, fingers, figure6, figure7]  # of other files than the manifest
+OTHERS = [faster, fingers, figure6, figure7]  # from other files than the manifest
 
 
 def refreshed(text):
-    """The page's text with today's figures."""
+    """The page with current figures."""
     manifest = json.loads((DOCS / "gallery" / "manifest.json").read_text())
     told = {f.__name__: f(manifest[FIGURE.get(f.__name__, f.__name__)]["measured"]) for f in TEXTS}
     told |= {f.__name__: f() for f in OTHERS}

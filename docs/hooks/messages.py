@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of the extension's messages, read from its code while the site is built.
+"""Lists the extension's messages, from its code, when the site is built.
 
-A page says where: `<!-- messages -->`. What the page explains itself is left out there.
+The list replaces `<!-- messages -->` in a page. Messages that the page explains are left out.
 """
 
 import ast
@@ -13,7 +13,7 @@ MARK = "<!-- messages -->"
 
 
 def literal(node):
-    """The text of a message, its gaps as '…'."""
+    """The text of a message, with '…' for placeholders."""
     if isinstance(node, ast.Constant):
         return re.sub(r"\{\w+\}", "…", str(node.value))
     if isinstance(node, ast.JoinedStr):
@@ -22,7 +22,7 @@ def literal(node):
 
 
 def of_the_extension():
-    """What its code raises as a UserError, but for what comes whole from elsewhere."""
+    """The texts of UserErrors in the add-on's code, except those of other sources."""
     found = set()
     for path in sorted(ADDON.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
@@ -32,7 +32,7 @@ def of_the_extension():
 
 
 def parts(message):
-    """Its pieces between gaps that are long enough to know it by."""
+    """The parts between placeholders that are long enough to identify the message."""
     return re.findall(r"[^…:,(;]{6,}", message)
 
 

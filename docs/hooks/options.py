@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of options, written while the site is built from the one table that everything else comes from.
+"""Tables of options, made from native/options/options.toml when the site is built.
 
-A page says where: `<!-- settings: deform -->` for what Blender's panel shows of an operation,
-`<!-- shown: contact/properties.py -->` for what it shows of the add-on's own settings in that file,
-`<!-- flags: fit -->` for the command line's flags, `<!-- buttons: addon -->` for all operators.
+In pages: `<!-- settings: deform -->` for an operation's settings in Blender's panel,
+`<!-- shown: contact/properties.py -->` for settings of the add-on in that file, `<!-- flags: fit -->` for
+flags of the command line, `<!-- buttons: addon -->` for all operators.
 """
 
 import ast
@@ -17,7 +17,7 @@ MARK = re.compile(r"<!-- (settings|flags|shown|buttons): ([\w/]+)(?:\.py)? -->")
 
 
 def resolved(path=None):
-    """The table native/options/options.toml, or another like it."""
+    """The resolved table of native/options/options.toml, or of another such file."""
     module = loaded(ROOT / "native" / "options" / "table.py")
     return module.resolved(path or module.TABLE)
 
@@ -44,7 +44,7 @@ def filled(markdown, table):
 
 
 def settings(block):
-    """What the panel shows: the everyday settings, then the advanced ones."""
+    """The table of the panel's settings, the advanced ones last."""
     options = {option["name"]: option for option in (*block["options"], *block["further"])}
     rows = ["| setting | in scripts | default | range | effect |", "|---|---|---|---|---|"]
     for name in (*block["panel"], *block["advanced"]):
@@ -57,7 +57,7 @@ def settings(block):
 
 
 def flags(block):
-    """Every option as a flag."""
+    """The table of flags."""
     rows = ["| flag | default | range | |", "|---|---|---|---|"]
     for option in (*block["options"], *block["further"]):
         rows.append(row(f"`--{option['name'].replace('_', '-')}`", *facts(option)))
@@ -65,7 +65,7 @@ def flags(block):
 
 
 def shown(file):
-    """What the panel shows of the settings that a file of the add-on declares."""
+    """The table of the settings that a file of the add-on declares."""
     tree = ast.parse((ADDON / f"{file}.py").read_text(encoding="utf-8"))
     drawn = "".join(
         path.read_text(encoding="utf-8")
@@ -91,7 +91,7 @@ def shown(file):
 
 
 def buttons():
-    """The add-on's operators, by their labels, with their tooltips."""
+    """The table of the add-on's operators: labels and tooltips."""
     rows = []
     for path in ADDON.rglob("*.py"):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
@@ -108,7 +108,7 @@ def buttons():
 
 
 def declarations(tree):
-    """(name, call) of what may declare a property: annotations, entries of dicts, arguments, constants."""
+    """Yields (name, call) of possible property declarations: annotations, dict items, arguments, names."""
     for node in ast.walk(tree):
         pairs = []
         if isinstance(node, ast.AnnAssign):
@@ -126,9 +126,9 @@ def declarations(tree):
 
 
 def words(call, names, choices):
-    """(label, effect) of a property's declaration, its choices included; empty where it is none."""
+    """(label, effect) of a property's declaration, with its choices; empty for other calls."""
     if len(call.args) < 2 and isinstance(names.get(getattr(call.func, "id", "")), ast.Call):
-        call = names[call.func.id]  # a function of the same file that makes it
+        call = names[call.func.id]  # a function of the same file that makes the property
     if not call.args or getattr(call.args[0], "id", "").startswith("ARAPFIELDS"):
         return "", ""
     given = [names.get(getattr(each, "id", ""), each) for each in call.args]
@@ -162,7 +162,7 @@ def range_of(option):
 
 
 def lower(text):
-    """A sentence within another: a capital that begins no name becomes small."""
+    """A sentence with its first letter in lower case, unless it begins with a name."""
     return text if text[1:2].isupper() else text[0].lower() + text[1:]
 
 

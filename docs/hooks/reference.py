@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The API reference, written from the docstrings of the installed package while the site is built."""
+"""The API reference, made from the docstrings of the installed package when the site is built."""
 
 import ast
 import importlib
@@ -20,7 +20,7 @@ are the mesh's own unless a docstring says *cube*; distances are negative inside
 """
 
 
-# What signatures say more plainly.
+# Simplifications of signatures.
 PLAIN = {
     r"SupportsInt \| SupportsIndex": "int",
     r"SupportsFloat \| SupportsIndex": "float",
@@ -54,7 +54,7 @@ def page():
 
 
 def in_pipeline_order(package):
-    """Names as the native module defines them, which is the order of the pipeline."""
+    """Names in the order of the native module, that of the pipeline."""
     native = list(vars(importlib.import_module("arapfields._native")))
     order = {name: i for i, name in enumerate(native)}
     return sorted(package.__all__, key=lambda name: order.get(name, len(order)))
@@ -83,7 +83,7 @@ def members(owner, name):
             continue
         if isinstance(member, property):
             if defaults and key not in defaults:
-                continue  # an older name of an option
+                continue  # a former name of an option
             given = f"| `{defaults[key]!r}` " if defaults else ""
             rows.append(f"| `{key}` {given}| {one_line(inspect.getdoc(member))} |")
         elif callable(member) or isinstance(member, staticmethod | classmethod):
@@ -102,7 +102,7 @@ def members(owner, name):
 
 
 def fields(owner):
-    """Rows of the fields that a class of ours declares in Python, each with the text below it."""
+    """Rows of the fields of a class declared in Python, with their descriptions."""
     rows = []
     for kind in reversed(owner.__mro__):
         if not kind.__module__.startswith("arapfields.") or kind.__module__.endswith("_native"):
@@ -117,7 +117,7 @@ def fields(owner):
 
 
 def signature(value, shown):
-    """The signature as a code block: pybind11 writes it as the docstring's first line."""
+    """The signature as a code block, from the first line of pybind11's docstring."""
     first = (value.__doc__ or "").split("\n", 1)[0]
     found = re.match(r"\w+(\(.*\))( -> .*)?$", first)
     if found:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The C++ of the resolved table: one header a struct, its checks, and the bindings of the Python classes."""
+"""C++ code of the resolved table: a header per struct, its checks, and the bindings of Python classes."""
 
 import math
 import textwrap
@@ -11,7 +11,7 @@ HINTS = {"int": "int", "float": "float", "bool": "bool", "seed": "int", "device"
 
 
 def files(table):
-    """File name → content."""
+    """{file name: content}."""
     made = {f"options/{name}.h": header(table, name) for name in table}
     made["options/choices.h"] = choices_header(table)
     made["options/options.cpp"] = source(table)
@@ -20,7 +20,7 @@ def files(table):
 
 
 def enums(table):
-    """Enum's C++ name → its option, each once."""
+    """{C++ name of an enum: an option that uses it}."""
     every = [option for block in table.values() for option in (*block["options"], *block["further"])]
     return {option["enum"]: option for option in every if option["enum"]}
 
@@ -31,12 +31,12 @@ def comment(text, indent="", mark="///"):
 
 
 def enumerator(choice):
-    """A choice as C++ has it: `auto` is a word of the language."""
+    """The C++ enumerator of a choice; `auto` is a keyword."""
     return {"auto": "automatic"}.get(choice, choice)
 
 
 def literal(option, value=None):
-    """A value of the option as C++."""
+    """A value of the option as a C++ literal."""
     value = option["default"] if value is None else value
     if option["type"] == "enum":
         return f"{option['enum']}::{enumerator(value)}"
@@ -52,7 +52,7 @@ def cpp_type(option):
 
 
 def explained(option):
-    """The sentence, with the unit where it does not say it, and what 0 stands for."""
+    """The sentence, with the unit if it lacks that, and the meaning of 0."""
     unit = option["unit"] not in option["sentence"].lower()
     text = option["sentence"] + (f" ({option['unit']})" if unit else "")
     for values in option["automatic"].values():
@@ -61,7 +61,7 @@ def explained(option):
 
 
 def automatic_rates(block):
-    """A function a value that an option's 0 stands for."""
+    """Yields a function for each option whose 0 stands for other values."""
     for option in block["options"]:
         for by, values in option["automatic"].items():
             chooser = next(o for o in block["options"] if o["name"] == by)
@@ -112,7 +112,7 @@ def header(table, name):
 
 
 def changed(table, block, group):
-    """The initialiser of a nested group of which this operation has other defaults."""
+    """The initializer of a nested group with other defaults in this operation; or ""."""
     declared = {o["name"]: o["default"] for o in table[group]["options"]}
     other = [o for o in block["options"] if o["group"] == group and o["default"] != declared[o["name"]]]
     values = ", ".join(f".{option['name']} = {literal(option)}" for option in other)
@@ -173,14 +173,14 @@ def source(table):
 
 
 def hint(option):
-    """The type as Python's type checkers read it."""
+    """The type annotation for Python."""
     if option["type"] == "enum":
         return "typing.Literal[" + ", ".join(f"'{name}'" for name in option["choices"]) + "]"
     return HINTS[option["type"]]
 
 
 def bindings(table):
-    """The Python classes."""
+    """The bindings of the Python classes."""
     bound = [name for name, block in table.items() if block["python"]]
     lines = [f"{LICENCE}\n{NOTE}\n", '#include "bindings/options_binding.h"\n']
     lines += [f'#include "options/{name}.h"\n' for name in bound]

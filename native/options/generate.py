@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes what is made from the options' table: python generate.py FOLDER [--table options.toml]
+"""Generates code and JSON from the table of options: python generate.py FOLDER [--table options.toml]
 
-In FOLDER: options/*.h, options/options.cpp and options/bind_options.cpp, and options.json, the resolved table
-that the command line and Blender read. Files that would stay the same are left alone.
+Writes to FOLDER: options/*.h, options/options.cpp, options/bind_options.cpp, and options.json, the resolved
+table for the command line and Blender. Unchanged files are not written.
 """
 
 import argparse
@@ -18,7 +18,7 @@ import table as options_table
 
 
 def contents(path):
-    """File name → content of everything that the table gives."""
+    """{file name: content} of all generated files."""
     resolved = options_table.resolved(path)
     made = cpp.files(resolved)
     made["options.json"] = json.dumps(resolved, indent=1, ensure_ascii=False) + "\n"

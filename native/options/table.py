@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""options.toml, read, checked and resolved: what each operation's options are after its overrides."""
+"""Reads, checks and resolves options.toml: the options of each operation, with its overrides."""
 
 import tomllib
 from pathlib import Path
@@ -17,11 +17,11 @@ OPTION_KEYS = {
 
 
 class TableError(Exception):
-    """What is wrong in the table, and where."""
+    """An error in the table, with its place."""
 
 
 def read(path=TABLE):
-    """The table as it stands; TableError where it is not one."""
+    """The parsed table; TableError if it is invalid."""
     with open(path, "rb") as file:
         table = tomllib.load(file)
     for name, block in table.items():
@@ -34,13 +34,13 @@ def read(path=TABLE):
 
 
 def resolved(path=TABLE):
-    """Name → what is known of every block that is a struct, in the table's order.
+    """{name: description} of every block that is a struct, in the table's order.
 
-    A dict with `struct`, `python`, `about`, `checks`, `groups`, `options`, `panel`, `advanced`, `presets`,
-    and `further`: what the panel shows beside the struct's own options. An option is a dict with `name`,
-    `group` (that of the struct in which it is nested, or ""), `type`, `default`, `low`, `high`, `soft_low`,
-    `soft_high`, `unit`, `label`, `sentence` (with what 0 stands for; `plain` without), `zero`, `choices`,
-    `enum`, `automatic`, `alias`, `methods`, `needs`.
+    A description is a dict with `struct`, `python`, `about`, `checks`, `groups`, `options`, `panel`,
+    `advanced`, `presets`, and `further`: settings of the panel that are no options of the struct. An option
+    is a dict with `name`, `group` (of the nested struct, or ""), `type`, `default`, `low`, `high`,
+    `soft_low`, `soft_high`, `unit`, `label`, `sentence` (with the meaning of 0; `plain` without), `zero`,
+    `choices`, `enum`, `automatic`, `alias`, `methods`, `needs`.
     """
     table = read(path)
     return {name: _resolve(table, name) for name, block in table.items() if "struct" in block}
@@ -92,7 +92,7 @@ def _pool(table, name, option):
 
 
 def _presets(given, options):
-    """Each preset sets what any of them names."""
+    """The presets; each sets all options that any preset names."""
     named = {option for preset in given.values() for option in preset["values"]}
     defaults = {o["name"]: o["default"] for o in options if o["name"] in named}
     if set(defaults) != named:
