@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every test may use: the folder of real data, and the helper modules beside this file."""
+"""Fixtures of all tests: the folder of published data, and the path of the helper modules."""
 
 import gc
 import os
@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-gc.disable()  # until all tests are there: of what is imported nothing goes
+gc.disable()  # until all tests are collected: imported objects stay anyway
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("ARAPFIELDS_DATA", ROOT.parent / "shared" / "data"))
 
 
-# Of libtorch itself, its version and its threads: these run where the library is built with it.
+# Tests of libtorch, its version and its threads: only for a library built with it.
 TORCH_ALONE = (
     "tests/packaging/test_libtorch_version.py",
     "tests/python/test_threads.py::test_calls_at_once_have_their_own_numbers_and_torch_keeps_its",
@@ -24,7 +24,7 @@ LONG_FIRST = ("docs", "packaging", "native", "blender", "python", "fuzz", "archi
 def deselect_those_of_torch(config, items):
     try:
         from arapfields import backend
-    except ImportError:  # not built: tests of files alone run
+    except ImportError:  # not built: only tests of files run
         return
     if backend() == "eigen":
         others = [item for item in items if item.nodeid.startswith(TORCH_ALONE)]
@@ -33,7 +33,7 @@ def deselect_those_of_torch(config, items):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Folders with long files first: processes that take files one by one then end at about the same time."""
+    """Sorts folders with slow files first, so that parallel processes end at about the same time."""
     items.sort(key=lambda item: LONG_FIRST.index(item.path.relative_to(ROOT / "tests").parts[0]))
     deselect_those_of_torch(config, items)
 
@@ -45,13 +45,13 @@ def pytest_collection_finish():
 
 @pytest.fixture(autouse=True, scope="session")
 def interrupts():
-    """Python's own handler: a shell that runs the tests in the background has them ignore Ctrl-C."""
+    """Restores Python's handler of Ctrl-C, which background jobs of a shell ignore."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
 def data_dir():
-    """Published neural SDFs and meshes; tests that need them skip where they are absent."""
+    """Folder of published neural SDFs and meshes; skips the test if it is missing."""
     if not DATA.is_dir():
         pytest.skip(f"no data at {DATA} (set ARAPFIELDS_DATA)")
     return DATA

@@ -108,7 +108,7 @@ def buttons():
 
 
 def declarations(tree):
-    """Yields (name, call) of possible property declarations: annotations, dict items, arguments, names."""
+    """Yields (name, call) of possible property declarations: annotations, dicts, arguments, assignments."""
     for node in ast.walk(tree):
         pairs = []
         if isinstance(node, ast.AnnAssign):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests that run inside a headless Blender (PyPI's bpy) with its own empty user folder.
+"""Runs tests in Blender without a window (PyPI's bpy), with an empty user folder.
 
 ARAPFIELDS_WORKER   command that runs a Python file in another Blender instead, as `blender --background
                     --factory-startup --python-use-system-env --python`; it must import arapfields and pytest
@@ -22,20 +22,20 @@ PROGRAM = ROOT / "tests/support/blender/worker.py"
 
 
 def isolated(folder):
-    """Environment of a Blender that knows nothing of the user's own."""
+    """Environment variables that isolate Blender from the user's settings."""
     paths = [str(ROOT), str(ROOT / "tests"), os.environ.get("PYTHONPATH", "")]
     return {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(filter(None, paths)),
         "BLENDER_USER_RESOURCES": str(folder),
         "TMPDIR": str(folder),
-        "OMP_NUM_THREADS": "1",  # the solves here are too small for more
-        "MALLOC_PERTURB_": "165",  # glibc: memory is filled when it is freed, so that who reads it then fails
+        "OMP_NUM_THREADS": "1",  # enough for the small solves here
+        "MALLOC_PERTURB_": "165",  # glibc overwrites freed memory, so that later reads of it fail
     }
 
 
 class Blender:
-    """The worker process; started when first needed, and again after a crash."""
+    """The worker process; started on first use, and again after a crash."""
 
     def __init__(self, folder):
         self.folder, self.process = folder, None
@@ -52,7 +52,7 @@ class Blender:
         order = {"file": file, "function": function, "arguments": arguments}
         self.process.stdin.write(json.dumps(order, default=str) + "\n")
         self.process.stdin.flush()
-        answer = next((line for line in self.process.stdout if line.startswith('"')), "")  # after its banner
+        answer = next((line for line in self.process.stdout if line.startswith('"')), "")  # after the banner
         if not answer:
             pytest.fail(f"Blender ended with status {self.process.wait()}")
         if json.loads(answer):
@@ -77,7 +77,7 @@ def blender(tmp_path_factory):
 def command(blender, tmp_path_factory):
     """command(*arguments, check=True, largest=None): the extension's command line in the worker.
 
-    `largest` limits the bytes of a file. The answer is as that of subprocess.run.
+    `largest` limits the size of files, in bytes. Returns the same as subprocess.run.
     """
     answer = tmp_path_factory.mktemp("command") / "answer.json"
 
@@ -103,7 +103,7 @@ def pytest_itemcollected(item):
 
 
 def pytest_pyfunc_call(pyfuncitem):
-    """The body of a test marked in_blender runs in the worker."""
+    """Runs the bodies of tests marked in_blender in the worker."""
     if pyfuncitem.get_closest_marker("in_blender"):
         given, names = pyfuncitem.funcargs, inspect.signature(pyfuncitem.obj).parameters
         worker, function = given["blender"], pyfuncitem.originalname

@@ -25,7 +25,7 @@ def without_code(page):
 
 
 def anchors(page):
-    """Anchors of a page's headings, as MkDocs makes them."""
+    """Anchors of a page's headings by MkDocs' rules."""
     from markdown.extensions.toc import slugify
 
     found = []

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs a page's Python blocks one after the other in one namespace: run_blocks.py PAGE, in an empty folder.
+"""Runs a page's Python blocks in order in one namespace: run_blocks.py PAGE, in an empty folder.
 
-Solves and fits are cut to a few steps, so that what is tested is that the code runs, not how well it solves.
-Blocks that import bpy get Blender with the extension registered.
+Solves and fits are limited to a few steps: the code is run, the quality of results is not tested. For blocks
+that import bpy, the extension is registered.
 """
 
 import os
@@ -24,8 +24,8 @@ LIMITS = {
     "uniform_points": 5000,
     "time_budget": 3.0,
 }
-FIT_ITERATIONS = 120  # fewer leave no surface to sample
-TAKE_OPTIONS = {  # as their third argument
+FIT_ITERATIONS = 120  # with fewer there is no surface to sample
+TAKE_OPTIONS = {  # functions whose third argument is options
     "fit_sdf": "FitOptions",
     "deform": "DeformOptions",
     "stylize": "StylizeOptions",
@@ -35,7 +35,7 @@ TAKE_OPTIONS = {  # as their third argument
 
 
 def shortened(kind):
-    """An options class whose instances never ask for much."""
+    """A subclass of an options class with low limits of iterations."""
 
     def short(options):
         limits = LIMITS | ({"iterations": FIT_ITERATIONS} if kind.__name__ == "FitOptions" else {})
@@ -69,7 +69,7 @@ def shorten_library():
 
 
 def readme_names():
-    """What the README's reader has: a mesh, a box around each end, and where the second is to go."""
+    """Names that the README's code uses: a mesh, a box around each end, and the target of the second."""
     from support.geometry.meshes import sphere
 
     V, F = sphere(1.0, 3)
@@ -99,4 +99,4 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
     main(Path(sys.argv[1]))
     sys.stdout.flush()
-    os._exit(0)  # bpy 4.5 may wait forever for a thread of its own while the process ends
+    os._exit(0)  # bpy 4.5 may deadlock at the end of the process

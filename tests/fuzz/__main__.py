@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The long run: `python -m tests.fuzz [--count 20000] [--seed 0] [TARGET …]`; exit code 1 where one fails."""
+"""Long fuzzing: `python -m tests.fuzz [--count 20000] [--seed 0] [TARGET …]`; exit code 1 on failure."""
 
 import argparse
 import sys

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Calls of the public interface with arguments of which some are odd. What comes out is either a result or a
-documented error, in the process that made the call."""
+"""Calls of the public interface with some invalid arguments, which must return a result or raise a documented
+error."""
 
 import types
 
@@ -10,7 +10,7 @@ from .calls import calls
 from .odd import ROWS, odd
 from .splats import splat_calls
 
-LEFT_OUT = {  # public callables that the net does not call, and why
+LEFT_OUT = {  # {public callable that is not fuzzed: reason}
     "ImplicitFunction": "a base for Python: tests/python/test_implicit_function.py",
     "ImplicitFunction.__call__": "likewise: classes of ours have their own",
     "ImplicitFunction.gradient": "likewise: classes of ours have their own",
@@ -26,7 +26,7 @@ LEFT_OUT = {  # public callables that the net does not call, and why
 
 
 def public_callables():
-    """Names of all functions, classes with a constructor and members, from the package itself."""
+    """Names of all functions, constructible classes and members of the package."""
     for name, value in vars(af).items():
         if name.startswith("_") or isinstance(value, types.ModuleType) or hasattr(value, "__origin__"):
             continue
@@ -39,7 +39,7 @@ def public_callables():
 
 
 def is_plain(cls):
-    """Errors, and results that are plain data."""
+    """Whether a class is an error or plain data."""
     return issubclass(cls, BaseException | tuple) or hasattr(cls, "__dataclass_fields__")
 
 
@@ -55,18 +55,18 @@ def called_members(cls):
 
 
 def unbound(rng):
-    """A method of a class, called on something that is no good instance of it."""
+    """A method of a class, called on an object that is no valid instance."""
     native = [v for v in vars(af._native).values() if isinstance(v, type)]
     chosen = rng.choice([v for v in native if not issubclass(v, BaseException)])
     called = ("__call__", "__len__", "__repr__", "__eq__")
     names = [n for n in dir(chosen) if not n.startswith("__") or n in called]
-    names = [n for n in names if n != "report"]  # an AttributeError, as of any attribute, where there is none
+    names = [n for n in names if n != "report"]  # raises AttributeError if there is none
     member = getattr(chosen, names[rng.integers(len(names))])
     return getattr(member, "fget", member), [chosen.__new__(chosen), *[ROWS] * int(rng.integers(2))]
 
 
 def case(rng, things):
-    """(name, function, arguments): a call with up to three odd arguments."""
+    """(name, function, arguments) of a call with up to three invalid arguments."""
     known = calls(rng, things) | splat_calls(things) | {"unbound": lambda: unbound(rng)}
     name = sorted(known)[rng.integers(len(known))]
     function, arguments = known[name]()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Good calls of the public interface, by the names of functions, classes and members."""
+"""Valid calls of the public interface by name of function, class or member."""
 
 from functools import partial
 
@@ -11,7 +11,7 @@ from .odd import CIRCLE, FACES, NORMALS, PLAIN, ROWS, TETRAHEDRON, TINY, WRAP, b
 
 
 def calls(rng, things):
-    """{name: (function, arguments)}: all of the interface, each argument good."""
+    """{name: (function, valid arguments)} of the whole interface."""
     t, task, moved = things, af.Task(), np.eye(4)
     fit = {"iterations": 2, "batch": 64, "near_points": 100, "uniform_points": 100, **TINY}
     live = {"samples": 50, "coarse_centers": 5, "fine_centers": 5, "iterations": 2, "threads": 1}
@@ -163,7 +163,7 @@ def live_calls(t):
 
 
 def options(rng, things):
-    """Of each class of options: itself with an odd value, its presets, its values."""
+    """Calls of each options class: constructor, presets, values."""
     named = {}
     for name, cls in vars(af).items():
         if not name.endswith("Options") or cls.__name__ != name:  # an alias
@@ -176,7 +176,7 @@ def options(rng, things):
 
 
 def members(t):
-    """Calls of objects that others make, and of functions with few arguments."""
+    """Calls of members of objects, and of functions with few arguments."""
     writer = af.PointCacheWriter
     moved = ROWS + 0.1
 
@@ -241,7 +241,7 @@ def members(t):
 
 
 def with_writer(member, *given):
-    """A member of a writer of one frame of four points, which leaves nothing behind."""
+    """A call of a member of a cache writer, with one frame of four points, which leaves no file."""
     writer = af.PointCacheWriter("motion.pc2", 4, 1)
     try:
         getattr(writer, member)(*given)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A target for each kind of file: good examples, how to damage them, and what reads (and uses) them."""
+"""A fuzz target for each kind of file: valid examples, how to damage them, and their readers."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ FEW = POINTS[:2]
 
 
 class Target:
-    """Example files by name, `damage(rng, name)` → bytes, and `use(path)` with documented errors alone."""
+    """{name: example file}, `damage(rng, name)` → bytes; `use(path)` may raise only documented errors."""
 
     documented = (af.InvalidInput, OSError)
 
@@ -33,7 +33,7 @@ class Target:
         self.contents = {name: path.read_bytes() for name, path in self.examples.items()}
 
     def case(self, rng):
-        """A damaged file in the folder."""
+        """Writes a damaged file to the folder."""
         name = sorted(self.examples)[rng.integers(len(self.examples))]
         path = self.folder / f"case-{self.examples[name].name}"
         path.write_bytes(self.damage(rng, name))
@@ -79,7 +79,7 @@ class Sdfs(Archives):
 
 
 class Meshes(Target):
-    """Meshes as the command line reads them, and their vertices moved as it writes them."""
+    """Meshes: read, moved and written by the command line's functions."""
 
     def make(self):
         examples = {}
@@ -102,7 +102,7 @@ class Meshes(Target):
 
 
 class Splats(Target):
-    """Splats' files."""
+    """Files of Gaussian splats."""
 
     def make(self):
         path = self.folder / "splats.ply"
@@ -163,7 +163,7 @@ class Normals(Target):
 
 
 class Records(Target):
-    """What a batch has noted, and what its children report."""
+    """Records of batches, and reports of their children."""
 
     def make(self):
         entry = {"status": "done", "message": "x", "options": "0", "source": [1, 2], "output": "a.ply"}
@@ -196,7 +196,7 @@ class Records(Target):
 
 
 class CommandLine(Target):
-    """The command line on damaged fields, meshes and handles: an exit code, never a traceback."""
+    """The command line on damaged fields, meshes and handles: ends with an exit code, without a traceback."""
 
     def make(self):
         self.parts = [kind(self.sub(kind.__name__)) for kind in (Fields, Sdfs, Meshes, Handles)]

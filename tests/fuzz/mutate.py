@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Damaged files: bytes, lines and numbers of texts, nodes of JSON, headers and arrays of archives.
+"""Mutations of files: bytes, lines and numbers of texts, nodes of JSON, headers and arrays of archives.
 
-Changes of structure keep lengths and offsets right, so that they get past the first checks.
+Mutations of the structure keep lengths and offsets consistent, to pass the first checks.
 """
 
 import json
@@ -42,7 +42,7 @@ def odd_value(rng):
 
 
 def mutate_bytes(rng, content):
-    """Some bytes replaced, removed, doubled or cut off."""
+    """Replaces, removes, doubles or truncates bytes."""
     data = bytearray(content)
     for _ in range(1 + int(rng.integers(4))):
         at = int(rng.integers(len(data) + 1))
@@ -64,7 +64,7 @@ def mutate_bytes(rng, content):
 
 
 def mutate_text(rng, content):
-    """Words and lines of a text replaced, removed, doubled, joined."""
+    """Replaces, removes, doubles or joins words and lines of a text."""
     lines = content.decode("latin-1").split("\n")
     for _ in range(1 + int(rng.integers(4))):
         at = int(rng.integers(len(lines)))
@@ -94,7 +94,7 @@ def nodes(value, path=()):
 
 
 def mutate_json(rng, value):
-    """A copy with one node replaced, removed, renamed, doubled or buried."""
+    """A copy with one node replaced, removed, renamed, doubled or nested."""
     value = json.loads(json.dumps(value))
     places = list(nodes(value))
     path = places[rng.integers(len(places))]
@@ -122,7 +122,7 @@ def mutate_json(rng, value):
 
 def dumped(rng, value):
     text = json.dumps(value).encode()
-    if rng.integers(10) == 0:  # a member twice
+    if rng.integers(10) == 0:  # a duplicate member
         text = text.replace(b"{", b'{"a": 1, "a": 2, ' if rng.integers(2) else b'{"width": 3, ', 1)
     if rng.integers(20) == 0:
         text = b"[" * int(rng.integers(100000)) + text
@@ -150,15 +150,15 @@ def mutate_array(rng, array):
 
 
 def mutate_archive(rng, content, texts, arrays):
-    """A saved file with one part of it changed; `texts` and `arrays` are the good file's."""
+    """A saved file with one part changed; `texts` and `arrays`: those of the valid file."""
     kind = rng.integers(5)
     with np.errstate(all="ignore"):
         if kind == 0:
             return mutate_bytes(rng, content)
-        if kind == 1:  # the header, with its length right
+        if kind == 1:  # the header, with its correct length
             header = mutate_json(rng, archives.header_of(texts, arrays))
             return archives.joined(dumped(rng, header), b"".join(a.tobytes() for a in arrays.values()))
-        if kind == 2:  # what the file says of itself
+        if kind == 2:  # the metadata
             return archives.packed({**texts, "structure": mutate_json(rng, texts["structure"])}, arrays)
         if kind == 3:
             name = ("format", "version", "kind", "structure", "report")[rng.integers(5)]

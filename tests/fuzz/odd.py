@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Good objects for calls of the public interface, and values that do not belong in them."""
+"""Valid objects and invalid values for calls of the public interface."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ CIRCLE = np.stack([np.cos(np.linspace(0, 6, 50)), np.sin(np.linspace(0, 6, 50))]
 
 
 def odd_arrays(rng):
-    """Arrays of other shapes, types, layouts and sizes than those that are asked for."""
+    """Arrays with unexpected shapes, types, layouts and sizes."""
     n = int(rng.integers(0, 5))
     return [
         np.full((n, 3), np.nan),
@@ -46,7 +46,7 @@ def odd_arrays(rng):
 
 
 def odd(rng, things):
-    """Any Python value that does not belong where it will be."""
+    """An unexpected Python value."""
     kind = rng.integers(5)
     if kind == 0:
         arrays = odd_arrays(rng)
@@ -67,7 +67,7 @@ def odd(rng, things):
 
 
 def make_things():
-    """One good object of each class, for calls and as arguments where they do not belong."""
+    """{name: object} of each class, for calls and as arguments of wrong types."""
     samples = af.SurfaceSamples(ROWS, NORMALS)
     held, moved = np.eye(4), np.eye(4)
     moved[0, 3] = 0.1
@@ -104,7 +104,7 @@ def make_things():
 
 
 def odd_options(rng, things, structure, **good):
-    """Options with up to two odd values; a long solve is ended by the alarm."""
+    """Options with up to two invalid values; the alarm ends a long solve."""
     for _ in range(int(rng.integers(3))):
         names = structure.fields
         good[names[rng.integers(len(names))]] = odd(rng, things)
@@ -112,7 +112,7 @@ def odd_options(rng, things, structure, **good):
 
 
 def by_name(function, *names):
-    """The function with its last arguments, which go by name, taken in order."""
+    """The function with its keyword arguments taken as last positional ones."""
 
     def call(*given):
         first = len(given) - len(names)

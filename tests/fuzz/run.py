@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs nets in processes of their own, and starts the next one where a case has ended its process."""
+"""Runs fuzz targets in separate processes; a new process continues after a case that ended one."""
 
 import json
 import queue
@@ -12,18 +12,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-HANG = 60.0  # seconds without a sign of life
-AT_ONCE = 2000  # cases a process
+HANG = 60.0  # seconds without output
+AT_ONCE = 2000  # cases per process
 
 
 @dataclass
 class Findings:
-    """What became of the cases of one target."""
+    """The outcomes of a target's cases."""
 
     target: str
     outcomes: Counter = field(default_factory=Counter)
-    failures: list = field(default_factory=list)  # (number, text)
-    texts: set = field(default_factory=set)  # of all refusals
+    failures: list = field(default_factory=list)  # [(number, text)]
+    texts: set = field(default_factory=set)  # messages of all documented errors
 
     def add(self, number, outcome):
         self.outcomes[outcome["outcome"]] += 1
@@ -42,7 +42,7 @@ def run_target(target, seed, count):
 
 
 def _run_process(findings, seed, first, count):
-    """The number of the case to go on with."""
+    """Runs cases in one process; returns the number of the next case."""
     command = [sys.executable, "-m", "tests.fuzz.worker", findings.target, str(seed), str(first), str(count)]
     process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     lines, errors = queue.Queue(), []
@@ -80,7 +80,7 @@ def _run_process(findings, seed, first, count):
 def refusals(
     folder="native/io", names=("archive", "json", "document", "network_file", "field_file", "input_file")
 ):
-    """Of each refusal in the reader's source: file, line, and the fixed parts of its text."""
+    """(file, line, fixed parts of the text) of each error in the readers' source."""
     refused = []
     for name in names:
         text = (ROOT / folder / f"{name}.cpp").read_text()
@@ -93,5 +93,5 @@ def refusals(
 
 
 def unreached(texts, folder="native/io"):
-    """The refusals of which no text was seen."""
+    """The errors that no case has raised."""
     return [r for r in refusals(folder) if not any(all(part in text for part in r[2]) for text in texts)]

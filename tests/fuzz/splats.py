@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Good calls of what concerns Gaussian splats."""
+"""Valid calls of functions of Gaussian splats."""
 
 import numpy as np
 
@@ -9,11 +9,11 @@ from .odd import ROWS, by_name
 
 PLAIN = (ROWS, np.tile([1.0, 0, 0, 0], (len(ROWS), 1)), np.full((len(ROWS), 3), 0.1))
 GIVEN = [*PLAIN, np.full(len(ROWS), 0.9), np.zeros((len(ROWS), 4, 3))]
-NUMBERS = (4 + 12, len(ROWS))  # that a motion changes
+NUMBERS = (4 + 12, len(ROWS))  # numbers per splat that a motion changes
 
 
 def splat_calls(things):
-    """{name: (function, arguments)} of what concerns splats."""
+    """{name: (function, valid arguments)} of functions of splats."""
     splats = af.GaussianSplats(*GIVEN)
     return {
         "GaussianSplats": lambda: (af.GaussianSplats, list(GIVEN)),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The nets, short: every refusal of the readers is reached, and none of the cases does anything worse."""
+"""Short runs of the fuzzers: the cases raise every error of the readers, and fail in no other way."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def test_nothing_but_documented_errors(target, findings):
     outcome = findings[target] = run_target(target, seed=3, count=COUNTS[target])
     assert sum(outcome.outcomes.values()) == COUNTS[target]
     assert not outcome.failures, outcome.failures[:3]
-    if target != "records":  # which count as damaged instead
+    if target != "records":  # these count as damaged instead
         assert outcome.outcomes["refused"] > COUNTS[target] // 10
 
 

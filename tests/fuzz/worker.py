@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs cases of one target: `python -m tests.fuzz.worker TARGET SEED FIRST COUNT`.
 
-Standard output gets a line for each case before it runs, and one for what became of it.
+Prints a line before each case, and one with its outcome.
 """
 
 import contextlib
@@ -21,8 +21,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-MEMORY = 2 << 30  # bytes that a case may ask for, beyond what the process has before
-PATIENCE = 2.0  # seconds after which a call is interrupted, as Ctrl-C would
+MEMORY = 2 << 30  # bytes that a case may allocate
+PATIENCE = 2.0  # seconds after which a call is interrupted, as by Ctrl-C
 
 
 class Late(Exception):
@@ -41,7 +41,7 @@ def limit_memory():
 
 @contextlib.contextmanager
 def only_errors(documented):
-    """Yields a dict that receives the outcome: "ok", "refused" with the error's text, or "failed"."""
+    """Context manager: a dict with the outcome: "ok", "refused" with the error's text, or "failed"."""
     outcome = {"outcome": "ok"}
     try:
         yield outcome
@@ -97,13 +97,13 @@ def run_api(seed, first, count, say):
 def main():
     target, seed, first, count = sys.argv[1], *map(int, sys.argv[2:5])
     lines = os.fdopen(os.dup(1), "w", buffering=1)
-    os.dup2(2, 1)  # what the targets print is theirs
+    os.dup2(2, 1)  # separates the targets' output
 
     def say(what):
         print(json.dumps(what), file=lines)
 
     run = run_api if target == "api" else partial(run_files, target)
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):  # odd paths are written to
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):  # invalid paths may be written to
         run(seed, first, count, say)
 
 

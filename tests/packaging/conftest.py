@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is uploaded to a package index, and an environment that has it."""
+"""The packages of a release, and an environment with the wheel."""
 
 import os
 import sys
@@ -12,7 +12,7 @@ from support.programs.native_build import BUILD, CMAKE, ROOT
 
 @pytest.fixture(scope="session")
 def built(tmp_path_factory):
-    """(wheel, source distribution) as `make release` makes them; ARAPFIELDS_DIST names a folder with both."""
+    """(wheel, source distribution), from the folder ARAPFIELDS_DIST or built as `make release` does."""
     folder = Path(os.environ.get("ARAPFIELDS_DIST", tmp_path_factory.mktemp("dist")))
     if not list(folder.glob("*.whl")):
         run(sys.executable, "-m", "pip", "install", "-q", "-r", ROOT / "cmake" / "wheel" / "requirements.txt")
@@ -24,13 +24,13 @@ def built(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def environment(built, tmp_path_factory):
-    """The Python of an environment in which the wheel alone was asked for."""
+    """The Python of an environment in which only the wheel was installed."""
     return fresh(tmp_path_factory.mktemp("right"), built[0])
 
 
 @pytest.fixture(scope="module")
 def prefix(tmp_path_factory):
-    """What `cmake --install` makes of the build."""
+    """The folder of `cmake --install`."""
     folder = tmp_path_factory.mktemp("prefix")
     run(CMAKE, "--install", BUILD, "--prefix", folder)
     return folder

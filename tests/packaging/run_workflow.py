@@ -3,9 +3,9 @@
 
 python tests/packaging/run_workflow.py .github/workflows/tests.yml [--job NAME] [--matrix python=3.11]
 
-What a step says is done as it is said, by the shell that GitHub uses. What needs GitHub has a substitute, and
-what cannot be done here is told with its reason: packages of the system are not installed, a container is
-replaced by this system, and jobs for other systems are left out. Exit code 1 where a step fails.
+Commands of steps run in the same shell as at GitHub. Steps that need GitHub are substituted, and those that
+cannot run here are reported with the reason: system packages are not installed, containers are replaced by
+this system, and jobs for other systems are left out. Exit code 1 if a step fails.
 """
 
 import argparse
@@ -29,7 +29,7 @@ KEPT = ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "SSL_CERT_FILE", "ARAPFIELDS
 
 
 def combinations(job):
-    """The matrix's combinations as dicts; one empty dict where there is no matrix."""
+    """The combinations of the matrix as dicts; one empty dict without a matrix."""
     matrix = dict(job.get("strategy", {}).get("matrix", {}))
     extra = matrix.pop("include", [])
     found = [dict(zip(matrix, values, strict=True)) for values in itertools.product(*matrix.values())]
@@ -43,7 +43,7 @@ def combinations(job):
 
 
 def filled(text, values):
-    """The text with its expressions replaced; those of the matrix and of the environment are known."""
+    """The text with expressions of matrix and environment replaced."""
 
     def value(match):
         expression = match[1].strip()
@@ -59,7 +59,7 @@ def filled(text, values):
 
 
 def plan(step, values):
-    """("run" | "substitute" | "left out", what or why)."""
+    """("run" | "substitute" | "left out", command or reason) of a step."""
     condition = step.get("if")
     if condition is not None and not filled(condition, values).strip():
         return "left out", "its condition does not hold"
@@ -76,7 +76,7 @@ def plan(step, values):
 
 
 def interpreter(version, path):
-    """A Python that starts: of `path`, where pyenv's names may lead to none, or pyenv's own."""
+    """A Python that starts, from `path` or from pyenv, whose shims may lead to none."""
     candidates = [shutil.which(f"python{version}", path=path)]
     candidates += sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python{version}"))
     for candidate in filter(None, candidates):
@@ -86,7 +86,7 @@ def interpreter(version, path):
 
 
 class Job:
-    """One job of one workflow, with one combination of its matrix, in `folder`."""
+    """A job of a workflow with a combination of its matrix, in `folder`."""
 
     def __init__(self, content, values, folder, limit, keep=()):
         self.content, self.values, self.folder, self.limit = content, values, folder, limit
@@ -95,7 +95,7 @@ class Job:
         shutil.rmtree(folder, ignore_errors=True)
         self.files.mkdir(parents=True)
         self.environment = {name: os.environ[name] for name in (*KEPT, *keep) if name in os.environ}
-        own = str(Path(sys.executable).parent)  # this script's Python is nothing that the workflow has
+        own = str(Path(sys.executable).parent)  # not available in the workflow
         folders = [part for part in self.environment["PATH"].split(os.pathsep) if part != own]
         self.environment |= {"PATH": os.pathsep.join(folders), "CI": "true", "GITHUB_ACTIONS": "true"}
         self.environment |= {str(key): filled(value, values) for key, value in content.get("env", {}).items()}
@@ -104,7 +104,7 @@ class Job:
             self.environment[name] = str(self.files / name)
 
     def python(self, version):
-        """The folder of programs of an environment with this Python, as a fresh machine has it."""
+        """The folder of programs of a fresh environment with this Python."""
         place = self.folder / f"python{version}"
         if not place.exists():
             python = interpreter(version, self.environment["PATH"])
@@ -127,7 +127,7 @@ class Job:
         try:
             code = process.wait(self.limit)
         except BaseException:
-            os.killpg(process.pid, signal.SIGKILL)  # the shell, and all that it has started
+            os.killpg(process.pid, signal.SIGKILL)  # the shell and its children
             process.wait()
             raise
         if code:
@@ -135,7 +135,7 @@ class Job:
         self.take_over()
 
     def take_over(self):
-        """What the step wrote for those that follow."""
+        """Reads the environment variables and paths that the step set for later steps."""
         for line in (self.files / "GITHUB_PATH").read_text().split():
             place = CONTAINER_PYTHON.sub(lambda f: str(self.python(f"{f[1]}.{f[2]}").parent), line)
             self.environment["PATH"] = f"{place}{os.pathsep}{self.environment['PATH']}"
@@ -168,7 +168,7 @@ class Job:
 
 
 def check_out(job, _):
-    """The last commit, in a clone: what is not committed is not there."""
+    """Clones the last commit, without uncommitted changes."""
     subprocess.run(["git", "clone", "-q", "--local", ROOT, job.clone], check=True)
 
 
@@ -178,7 +178,7 @@ def set_up_python(job, given):
 
 
 def upload(job, given):
-    """Copies what GitHub would keep; nothing to keep is an error where the step says so."""
+    """Copies the files that GitHub would store; it is an error if there are none and the step says so."""
     patterns = filled(given["path"], job.values)
     files = [path for pattern in patterns.split() for path in sorted(job.clone.glob(pattern))]
     if not files and given.get("if-no-files-found") == "error":

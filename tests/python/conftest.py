@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What several files share: the shape of wraps and of their landmarks, and saved fields."""
+"""Fixtures of several files: shapes and landmarks of wraps, and saved fields."""
 
 import pytest
 from support.files import archives
@@ -20,5 +20,5 @@ def samples(figure):
 
 @pytest.fixture(scope="session")
 def examples(tmp_path_factory):
-    """{kind: path} of saved fields and signed distances, for reading alone."""
+    """{kind: path} of saved fields and signed distances, read-only."""
     return archives.make_examples(tmp_path_factory.mktemp("examples"))

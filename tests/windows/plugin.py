@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""pytest's plugin in the Windows Python: leaves out what not_run.py lists, keeps outcomes as they come."""
+"""Pytest plugin in the Windows Python: skips the tests of not_run.py, and writes outcomes at once."""
 
 import ctypes
 import faulthandler
@@ -12,7 +12,7 @@ import pytest
 from .not_run import NOT_RUN
 
 STATUS = pytest.StashKey()
-SECONDS = 600  # of a test; then the process says where it stands, and ends
+SECONDS = 600  # time limit of a test; then the process prints its stack and ends
 
 
 def pytest_collection_modifyitems(items):
@@ -23,7 +23,7 @@ def pytest_collection_modifyitems(items):
 
 
 def keep(name, outcome, why):
-    """Of a test's three parts a later one that does not pass counts."""
+    """Appends an outcome to the file; the last one of a test counts."""
     with open(os.environ["ARAPFIELDS_OUTCOMES"], "a", encoding="utf-8") as file:
         file.write(json.dumps([name, outcome, why]) + "\n")
 
@@ -52,7 +52,7 @@ def pytest_sessionfinish(session, exitstatus):
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config):
-    """Ends the process at once: under Wine it would wait for ever for libtorch's libraries to leave."""
+    """Ends the process at once: under Wine, unloading of libtorch's libraries would hang."""
     sys.stdout.flush()
     sys.stderr.flush()
     ctypes.windll.kernel32.TerminateProcess(ctypes.c_void_p(-1), config.stash.get(STATUS, 1))
