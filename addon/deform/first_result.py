@@ -10,7 +10,7 @@ import hashlib
 
 import bpy
 
-from ..blender import timers
+from ..blender import modifier_stack, timers
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..field_modifier import motion
@@ -67,6 +67,20 @@ class FirstResult:
             steps.note(source, motion.snapshot(source), self._before)
         except UserError:  # the mesh has changed: the job reports it
             self.clear()
+
+    def hand_over(self):
+        """Restores the motion from before the preview, but leaves a modifier that the preview has added to
+        the result: Blender crashes if a modifier is removed while one of its inputs is being typed."""
+        source = self._surface.reference.find()
+        modifier = modifier_stack.find(source) if self._shown and source is not None else None
+        if modifier is None or self._before is not None or source.mode != "OBJECT":
+            self.clear()
+        else:
+            motion.write_to(motion.carrier(source, modifier), motion.Motion(None))
+
+    def keep(self):
+        """Leaves the source as it is, now that the result is placed."""
+        self._shown = False
 
     def clear(self):
         """Restores the motion from before the preview."""

@@ -90,11 +90,13 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
     def apply(work_result):
         solved, pose = work_result
         if preview is not None:
-            preview.clear()
+            preview.hand_over()
         owner = surface.reference.get()
         if result != "NEW":
             operator.gone = tuple(one for one in operator.gone if one[0].uid != surface.reference.uid)
         item = placement.place_result(bpy.context, owner, kind, output, result, solved, placed.local)
+        if preview is not None:
+            preview.keep()
         if solved.place is not None:
             placement.put(bpy.context, item, solved.place)
         applying.solved[owner.session_uid] = pose

@@ -48,6 +48,8 @@ class Preview:
     def clear(self):
         shown.clear()
 
+    hand_over = keep = clear
+
 
 def batch_of(points, normals, triangles):
     """GPU batch of the vertices with shaded colours."""

@@ -8,8 +8,11 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes, stages
 
+    from addon.core.errors import UserError
     from addon.core.runtime import jobs
     from addon.core.runtime.coroutines import Pause
+    from addon.field_modifier import inputs
+    from addon.results import placement
 
 pytestmark = pytest.mark.in_blender
 
@@ -48,6 +51,54 @@ def test_a_result_waits_for_the_end_of_edit_mode():
     bpy.ops.object.mode_set(mode="OBJECT")
     assert steps_until(coroutine, lambda: False) == {"FINISHED"}
     assert scenes.world_points(bar)[:, 2].max() > 0.4
+
+
+@pytest.mark.parametrize("ends", ["FINISHED", "CANCELLED"])
+def test_a_result_takes_the_modifier_that_a_first_shape_made(ends):
+    """Its inputs may be in the user's hands: Blender crashed when it went."""
+    stage = stages.Stage("window")
+    bar, _ = stage.begin()
+    operator = stage.operator()
+    operator.in_window = True
+    stage.start(operator)
+    preview = jobs.running().items[0].preview
+    preview.show(preview.points.astype("f4"))
+    inputs.put(bar.modifiers[0], "Factor", 0.5)
+    if ends == "CANCELLED":
+        jobs.running().cancel()
+    assert steps_until(stage.coroutine, lambda: False) == {ends}
+    preview.clear()  # as the window's display does in the end
+    if ends == "CANCELLED":
+        assert not bar.modifiers
+        return
+    assert len(bar.modifiers) == 1 and inputs.get(bar.modifiers[0], "Factor") == 0.5
+    inputs.put(bar.modifiers[0], "Factor", 1.0)
+    bpy.context.view_layer.update()
+    shown = scenes.world_points(bar)
+    bpy.ops.arapfields.remove_field()
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    assert (scenes.world_points(bar) == shown).all()
+
+
+def test_a_first_shape_goes_where_its_result_is_refused():
+    stage = stages.Stage("window")
+    bar, _ = stage.begin()
+    operator = stage.operator()
+    operator.in_window = True
+    stage.start(operator)
+    preview = jobs.running().items[0].preview
+    preview.show(preview.points.astype("f4"))
+
+    def refuse(*given):
+        raise UserError("no")
+
+    places, placement.place_result = placement.place_result, refuse
+    try:
+        assert steps_until(stage.coroutine, lambda: False) == {"CANCELLED"}
+    finally:
+        placement.place_result = places
+    preview.clear()
+    assert not bar.modifiers and "ARAP Fields" not in bar.data.attributes
 
 
 def test_one_that_waits_is_cancelled():
