@@ -2,8 +2,8 @@
 """Checks in Blender's window: `python -m tests.gui [--output FOLDER] [NAME …]`; exit code 1 where one fails.
 
 ARAPFIELDS_WINDOW   command of a Blender with a window (default `blender`), which can import arapfields
-Names are the parts of tests/gui/verdicts.py; film and pose take a file, as film=PINS.blend. Without names all
-run that need none.
+Names are the parts of tests/gui/verdicts.py; film and pose take a file, as film=PINS.blend. By default all
+parts without a file run.
 """
 
 import argparse
@@ -23,7 +23,7 @@ SCRIPT = Path(__file__).with_name("window.py")
 
 
 def groups(names):
-    """What runs in one Blender: each of ALONE by itself, the others together."""
+    """The parts by Blender process: each of ALONE separately, the others together."""
     names = names or [name for name in EXPECTED if "-" not in name and name not in ("film", "pose")]
     unknown = [name for name in names if part_of(name) not in EXPECTED]
     if unknown:
@@ -54,7 +54,7 @@ def part_of(name):
 
 
 def verdicts_of(group, folder):
-    """{part: what is wrong}; where one breaks off, those after it run in another Blender."""
+    """{part: lines of failures}; after a part that ends Blender, the others run in a new one."""
     for name in ("checks.json", JUDGED):
         (folder / name).unlink(missing_ok=True)
     size, verdicts = SIZES.get(part_of(group[0]), ("1600", "1000")), {}

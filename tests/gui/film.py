@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pin page's steps in a window, by mouse, a picture of it after each move: frames of a film.
+"""Films the steps of the guide's page on pins in a window, by mouse, with a picture after each move.
 
 blender --factory-startup --window-geometry 0 0 880 620 --python tests/gui/window.py -- FOLDER film=PINS.blend
-Writes FOLDER/NNN.png and film.json: where the cursor was in each, which the pictures do not show, and
-whether its button was down.
+Writes FOLDER/NNN.png and film.json, with the cursor's position and button in each picture.
 """
 
 import json
@@ -16,13 +15,13 @@ from mathutils import Euler
 from support.blender import scenes
 
 FEET = ((0.33, -0.05, 0.10), (-0.24, -0.10, 0.10))
-DRAGS = (((0.15, -0.80, 1.42), (-22, -58)), ((0.02, 1.30, 0.84), (-24, -104)))  # where, pixels to go
+DRAGS = (((0.15, -0.80, 1.42), (-22, -58)), ((0.02, 1.30, 0.84), (-24, -104)))  # (location, pixels to drag)
 BACKGROUND = (0.16, 0.17, 0.19)
 STEPS = 9
 
 
 class Film:
-    """Pictures of the window and what is known of each."""
+    """Pictures of the window, with the cursor's state in each."""
 
     def __init__(self, folder):
         self.folder, self.frames = folder, []
@@ -39,7 +38,7 @@ class Film:
 
 
 def set_view(item):
-    """The creature alone, from its front and side, no grid; the tool in hand."""
+    """Shows only the creature, from its front and side, without grid, and activates the tool."""
     bpy.data.collections["Studio"].hide_viewport = True
     scenes.activate(item)
     with stage.override():
@@ -68,7 +67,7 @@ def set_view(item):
 
 
 def glide(film, start, end, steps=3):
-    """The cursor on its way, without its button."""
+    """Moves the cursor without a pressed button."""
 
     for step in range(1, steps + 1):
         spot = [round(a + step / steps * (b - a)) for a, b in zip(start, end, strict=True)]

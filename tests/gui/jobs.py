@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Jobs in the window: they tick, preview, cancel and undo; they end when the file does."""
+"""Jobs in the window: progress, previews, cancelling and undo, and their end when a file is loaded."""
 
 import time
 
@@ -58,7 +58,7 @@ def running(figures, folder):
     yield from until_idle(30)
     figures["cancel_s"] = round(time.perf_counter() - begin, 4)
     figures["exact_after_cancel"] = stage.everything() == before
-    yield 4.0  # sections of the panel slide to where they stay
+    yield 4.0  # until the panel's sections have stopped moving
     stage.picture(folder, "cancelled")
     yield from in_place(figures, folder, before)
     yield from escape(figures, before)
@@ -66,7 +66,7 @@ def running(figures, folder):
 
 
 def in_place(figures, folder, before):
-    """The mesh itself shows what there is so far, and is what it was after Cancel."""
+    """The mesh shows the preview, and is restored after Cancel."""
     rest = stage.positions("Bar")
     invoke({**LONG, "result": "MODIFIER"})
     yield from until(lambda: np.abs(stage.positions("Bar") - rest).max() > 0.3)
@@ -80,7 +80,7 @@ def in_place(figures, folder, before):
 
 
 def escape(figures, before):
-    """Cancelled by the key instead of the button."""
+    """Cancels by the key instead of the button."""
     invoke(LONG)
     stage.tool("mousemove", 600, 500)
     yield 1.5
@@ -110,7 +110,7 @@ def result(figures, folder):
 
 
 def endings(figures, folder):
-    """A job while a step is undone, a file is loaded, the add-on is switched off."""
+    """A job during undo, the load of a file, and the add-on's disabling."""
     for name, act in (
         ("undo", lambda: bpy.ops.ed.undo()),
         ("load", lambda: bpy.ops.wm.read_homefile(use_empty=True)),

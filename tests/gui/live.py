@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live mode in the window: how often the viewport follows, one undo step a drag, off restores."""
+"""Live mode in the window: update rate of the viewport, one undo step per drag, restoring at its end."""
 
 import time
 
@@ -14,7 +14,7 @@ from addon.live import sessions
 from addon.solver.frame_solver import FrameSolver
 
 SECONDS = 5.0
-PATIENT = 60.0  # the same where a busy machine has shown no shape by then
+PATIENT = 60.0  # the same if a busy machine has shown no shape until then
 
 
 def checks(figures, folder):
@@ -23,7 +23,7 @@ def checks(figures, folder):
 
 
 def rate(figures, folder):
-    """Moves a handle of a mesh of 50,000 vertices: how often the viewport shows a new shape."""
+    """Moves a handle of a mesh of 50,000 vertices, and measures how often the viewport shows a new shape."""
     stage.empty_file()
     with stage.override():
         bar, _, moving = scenes.bar_with_handles()
@@ -80,9 +80,9 @@ def one_rate(figures, name, moving):
 
 
 def without_drawing(moving):
-    """Updates a second where nothing is drawn: solve, warp, mesh and dependency graph, one after another.
+    """Updates per second without drawing: solve, warp, mesh and dependency graph in sequence.
 
-    Each is the first shape for that place of the handle.
+    Each is the first shape for the handle's location.
     """
     (session,) = sessions.live.values()
     begin, count = time.perf_counter(), 0
@@ -99,7 +99,7 @@ def without_drawing(moving):
 
 
 def drag(figures, folder):
-    """A drag with the mouse, as a user does it: one undo step, and the shape returns with it."""
+    """Drags with the mouse: one undo step, which restores the shape."""
     stage.empty_file()
     with stage.override():
         bar, _, moving = scenes.bar_with_handles()

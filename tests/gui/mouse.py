@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mouse over the 3D view, moved by xdotool; waits go by what has happened, as the machine may be busy."""
+"""Moves the mouse over the 3D view by xdotool; waits for conditions, as the machine may be busy."""
 
 import time
 
@@ -13,7 +13,7 @@ from addon.pin_tool.hover import hover as hovering
 
 
 def pixel(point):
-    """Where a point of the world is on the screen, from its top left; the window fills it."""
+    """Screen coordinates in pixels of a point in world space; the window fills the screen."""
     window, area, region = stage.view()
     spot = location_3d_to_region_2d(region, area.spaces.active.region_3d, Vector(point))
     return round(region.x + spot.x), round(window.height - region.y - spot.y)
@@ -42,8 +42,7 @@ def hover(spot):
 
 
 def until(reached, limit=20.0, sign=lambda: None):
-    """Waits until a condition holds, so many seconds at most since `sign()` last changed: the machine may be
-    busy."""
+    """Waits until a condition holds, at most `limit` seconds since `sign()` last changed."""
     begin, seen = time.perf_counter(), sign()
     while not reached() and time.perf_counter() - begin < limit:
         yield 0.02
@@ -53,19 +52,19 @@ def until(reached, limit=20.0, sign=lambda: None):
 
 
 def until_idle(limit=60.0):
-    """Until no job runs, or one has stood still for so long."""
+    """Waits until no job runs, or a job has made no progress for `limit` seconds."""
     yield from until(lambda: jobs.running() is None, limit, jobs.progress)
 
 
 def until_live_rests(limit=30.0):
-    """Until the live shapes are refined and shown, if there are any."""
+    """Waits until the live shapes, if any, are refined and shown."""
     yield 0.1
     yield from until(lambda: all(s.worker and s.worker.is_settled for s in sessions.live.values()), limit)
     yield 0.1
 
 
 def is_followed():
-    """Whether the shape has reached the handle that is dragged."""
+    """Whether the shape has reached the dragged handle."""
     return all(s.worker is not None and s.worker.wait(0.0) for s in sessions.live.values())
 
 
@@ -74,7 +73,7 @@ def is_dragging():
 
 
 def release():
-    """The button goes up, and the shape comes to rest."""
+    """Releases the button, and waits until the shape is at rest."""
     stage.tool("mouseup", 1)
     yield 0.1
     yield from until(lambda: not is_dragging())
@@ -82,7 +81,7 @@ def release():
 
 
 def drag(start, end, steps=8, pause=0.05, hold=False):
-    """The button pressed at one spot, and released at another unless it is to be held."""
+    """Presses the button at one pixel, moves to another, and releases it there unless `hold`."""
     yield from hover(start)
     stage.tool("mousedown", 1)
     yield from until(is_dragging, 3.0)

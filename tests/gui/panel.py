@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of the panel's sections, one open at a time, in English and German; of handles in the viewport."""
+"""Pictures of the panel's sections, one open at a time, in English and German, and of handles."""
 
 import bpy
 import stage
@@ -8,9 +8,9 @@ from addon.preferences import ARAPFIELDS_AP_preferences, show
 from addon.registration import CLASSES
 
 PANEL, ADVANCED = "ARAPFIELDS_PT_", "ARAPFIELDS_PT_advanced"
-HEADER, STEP = (1120, 97), 28.4  # the sidebar's first header, and from one closed section to the next
-INNER = 26.0  # from one closed section within Advanced to the next
-STYLES = (1150, 127)  # the menu of styles below the header of its section, were that the first
+HEADER, STEP = (1120, 97), 28.4  # the sidebar's first header, and the distance of closed sections
+INNER = 26.0  # distance of closed sections in Advanced
+STYLES = (1150, 127)  # the menu of styles, if its section were the first
 SIDEBAR = (1028, 84, 258, 820)  # left, top, width, height
 
 
@@ -18,8 +18,8 @@ def checks(figures, folder):
     bar, moving = bpy.data.objects["Bar"], bpy.data.objects["Moving"]
     bar.modifiers.new("Subdivision", "SUBSURF")
     moving.location.z, moving.rotation_euler.y = 0.45, -0.5
-    bar.arapfields.surface = "FIT"  # which has more to show
-    yield 4.0  # sections slide to where they stay
+    bar.arapfields.surface = "FIT"  # has more settings
+    yield 4.0  # until the sections have stopped moving
     figures["panel_seen"] = stage.is_panel_seen()
     stage.picture(folder, "handles")
     yield from sections(folder, "panel")
@@ -40,7 +40,7 @@ def checks(figures, folder):
 
 
 def rows(parent=None):
-    """The sections that are drawn now, top to bottom: all, or those within another."""
+    """The sections that are drawn, from top to bottom: all, or those within another."""
     with stage.override():
         shown = [c for c in CLASSES if c.__name__.startswith(PANEL) and c.poll(bpy.context)]
     shown = [c for c in shown if getattr(c, "bl_parent_id", None) == parent]
@@ -66,14 +66,14 @@ def sections(folder, name):
 
 
 def picture(folder, name):
-    """Of the sidebar, with the mouse where it lights nothing up."""
+    """A picture of the sidebar, with the mouse where it highlights nothing."""
     stage.tool("mousemove", 500, 940)
     yield 0.7
     stage.picture(folder, name, SIDEBAR)
 
 
 def within(folder, name, row):
-    """The sections in Advanced, which is open at that row, one by one."""
+    """Pictures of the sections in Advanced, which is open at that row."""
     for number, section in enumerate(rows(ADVANCED)):
         yield from press(row + 1, number)
         yield from picture(folder, f"{name}-{section}")
@@ -81,7 +81,7 @@ def within(folder, name, row):
 
 
 def open_alone(names):
-    """Opens these sections and closes all others: with Ctrl a click closes all but one."""
+    """Opens these sections and closes all others; a click with Ctrl closes all but one."""
     for words in (("mousemove", *HEADER), ("keydown", "ctrl"), ("click", 1), ("keyup", "ctrl")):
         stage.tool(*words)
         yield 0.7
@@ -97,7 +97,7 @@ def press(row, inner=0):
 
 
 def preferences(folder, name):
-    """The add-on's preferences, drawn in a popup of their own."""
+    """A picture of the add-on's preferences, drawn in a popup."""
 
     class Shown(bpy.types.Operator):
         bl_idname, bl_label = "wm.arapfields_preferences_shown", "ARAP Fields"

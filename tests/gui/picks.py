@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is seen is what a click hits, and it is seen alone: source, live shape and results, stage by stage.
+"""Clicks select what is visible, and only one mesh is visible: source, live shape and results in each stage.
 
-At each stage one mesh is in sight. Ten clicks mean what they seem to: four on it, four on edges of the
-handles, and two where it was at rest and no longer is, which choose nothing.
+Ten clicks per stage: four on the visible mesh, four on edges of handles, and two where the mesh was at rest
+and nothing is now, which select nothing.
 """
 
 import bpy
@@ -16,11 +16,11 @@ from use import edge_points
 
 from addon.live import sessions
 
-ON_MESH, ON_HANDLE, ON_NOTHING = 4, 2, 2  # clicks; on each of the two handles
-BESIDE = 20.0  # pixels from an Empty's line at which a click can only mean what is behind it
+ON_MESH, ON_HANDLE, ON_NOTHING = 4, 2, 2  # numbers of clicks; ON_HANDLE for each of the two handles
+BESIDE = 20.0  # least distance in pixels from an Empty's lines of clicks on other things
 CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 EDGES = [(a, b) for a in range(8) for b in range(a) if bin(a ^ b).count("1") == 1]
-STAGES = {  # one after another, and what is seen at each
+STAGES = {  # in order, with the visible object of each
     "source": "Bar",
     "live": "Bar_live",
     "kept": "Bar_deformed",
@@ -62,7 +62,7 @@ def checks(figures, folder, in_place=False):
 
 
 def choose(bar):
-    """As a click in the outliner does, which may also mean what is hidden."""
+    """Selects as a click in the outliner does, also a hidden object."""
     for other in bpy.context.selected_objects:
         other.select_set(False)
     bpy.context.view_layer.objects.active = bar
@@ -109,12 +109,12 @@ def clicks(cell, mesh, empties, rest):
 
 
 def corners(empty):
-    """(8, 2) pixels of the corners of the Empty's cube, in the order of CORNERS."""
+    """(8, 2) pixel coordinates of the corners of the Empty's cube, in the order of CORNERS."""
     return np.array([pixel(empty.matrix_world @ Vector(corner)) for corner in CORNERS], dtype=float)
 
 
 def is_clear(point, empties):
-    """Whether a point of the world is seen well beside every edge of these Empties' cubes."""
+    """Whether a point is at a distance from all edges of these Empties' cubes, in pixels."""
     at = np.array(pixel(point), dtype=float)
     for empty in empties:
         ends = corners(empty)
@@ -127,7 +127,7 @@ def is_clear(point, empties):
 
 
 def visible_vertices(item, count, empties):
-    """Vertices of what is shown of an object that nothing hides from the viewer, far from one another."""
+    """Visible evaluated vertices of an object, far from each other."""
     _, area, region = stage.view()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     eye = area.spaces.active.region_3d
@@ -147,7 +147,7 @@ def visible_vertices(item, count, empties):
 
 
 def left_behind(rest, empties, count):
-    """Points where the mesh was at rest, at which nothing is seen now."""
+    """Points of the mesh at rest at which nothing is visible now."""
     _, area, region = stage.view()
     depsgraph, eye, points = bpy.context.evaluated_depsgraph_get(), area.spaces.active.region_3d, []
     for point in rest:

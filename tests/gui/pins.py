@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pin tool by mouse and keys: first pin, drags, Esc, anchors, deleting, a view that turns."""
+"""The pin tool by mouse and keys: first pin, drags, Esc, anchors, deleting, rotation of the view."""
 
 import subprocess
 import time
@@ -28,7 +28,7 @@ def checks(figures, folder, rate_alone=False):
 
 
 def set_stage(dense=False):
-    """The bar alone from the front, and the tool in hand."""
+    """Shows only the bar, from the front, and activates the tool."""
     stage.empty_file()
     with stage.override():
         bar = scenes.bar()
@@ -43,7 +43,7 @@ def set_stage(dense=False):
 
 
 def state():
-    """All names, positions and places, and the shape of the bar, to be compared bit for bit."""
+    """All names, positions and transforms, and the shape of the bar, for comparison bit by bit."""
     bpy.context.view_layer.update()
     bar = bpy.data.objects["Bar"]
     handles = [(e.empty.name, e.anchor, tuple(e.rest)) for e in bar.arapfields.handles]
@@ -79,7 +79,7 @@ def by_hand(figures, folder):
 
 
 def beside(figures, bar):
-    """A drag that begins beside the mesh, with the object selected."""
+    """A drag that begins beside the mesh of the selected object."""
     with stage.override():
         scenes.activate(bar)
     before, spot = state(), pixel((0.0, -0.25, 0.8))
@@ -101,7 +101,7 @@ def anchor_turn_delete(figures, folder, bar):
     stage.tool("keyup", "shift")
     figures["pins_anchor"] = [entry.anchor for entry in bar.arapfields.handles] == [False, True]
     pin = bar.arapfields.handles[0].empty
-    bar.arapfields.handles[0].hold_turn = True  # the Empty turns as the surface is turned there
+    bar.arapfields.handles[0].hold_turn = True  # the Empty rotates with the surface
     spot, before = pixel(pin.location), pin.rotation_euler.copy()
     yield from hover(spot)
     stage.tool("click", 1)
@@ -137,7 +137,7 @@ def anchor_turn_delete(figures, folder, bar):
 
 
 def navigation(figures, folder, bar):
-    """The wheel during a drag zooms, and the pin stays under the cursor; with Ctrl it changes its reach."""
+    """During a drag the wheel zooms, with the pin under the cursor; with Ctrl it changes the pin's reach."""
     _, area, _ = stage.view()
     view, pin = area.spaces.active.region_3d, bar.arapfields.handles[0].empty
     spot, distance = pixel(pin.location), view.view_distance
@@ -171,9 +171,9 @@ def navigation(figures, folder, bar):
 
 
 def first_and_rate(figures, folder):
-    """On 50,000 vertices: from the press to a shape that follows, and shapes a second in a drag.
+    """For 50,000 vertices: time from the press to the first shape, and shapes per second in a drag.
 
-    The solver has been set up while the cursor lay on the mesh.
+    The solver is set up while the cursor is over the mesh.
     """
     bar = set_stage(dense=True)
     _, area, _ = stage.view()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A dog of our own is posed with the pin tool, by five clicks and drags; a picture after each.
+"""Poses a dog with the pin tool by five clicks and drags, with a picture after each.
 
 python tests/gui/pose.py DOG.npz writes the dog's mesh (it needs scikit-image);
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER pose=DOG.npz poses it, by xdotool.
@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-# What is done, where (x, y, z at rest), and by how much across and up.
-ACTIONS = (  # the guide's recipe, docs/guide/pins.md
+# (action, point at rest (x, y, z), motion to the right and up).
+ACTIONS = (  # as in docs/guide/pins.md
     ("anchor", (0.17, 0.46, 0.10), None),  # a hind paw
     ("anchor", (-0.17, 0.46, 0.10), None),
     ("anchor", (-0.17, -0.46, 0.10), None),
@@ -30,7 +30,7 @@ def write(path):
 
 
 def load(path):
-    """The dog in the scene, turned as importers turn it, with vertex groups that name its parts."""
+    """Adds the dog, rotated as by importers, with vertex groups of its parts."""
     import bpy
     import numpy as np
 
@@ -93,7 +93,7 @@ def checks(path, figures, folder):
 
 
 def judged(rest, now):
-    """What makes the pose a good one: (n, 3) points at rest and now."""
+    """Measures of the pose's quality, of (n, 3) points at rest and now."""
     import numpy as np
 
     from addon.core.geometry.rotations import best_rotation

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the press of Deform or Stylize to a picture, at 50,000 vertices; what shows before stays nowhere."""
+"""Time from the press of Deform or Stylize to the result, for 50,000 vertices; previews leave nothing."""
 
 import time
 
@@ -12,7 +12,7 @@ from support.blender import scenes
 from addon.core.runtime import jobs
 from addon.field_modifier import motion
 
-LIMIT = 60.0  # seconds without progress until a result is given up
+LIMIT = 60.0  # seconds without progress before a result is given up
 ROUNDS = 2
 
 
@@ -26,7 +26,7 @@ def checks(figures, folder):
 
 
 def round_off(bar):
-    """Makes the bar an ellipsoid, which no style leaves as it is."""
+    """Makes the bar an ellipsoid, which every style changes."""
     flat = np.empty(3 * len(bar.data.vertices), dtype=np.float32)
     bar.data.vertices.foreach_get("co", flat)
     half = np.array([1.0, 0.25, 0.25], dtype=np.float32)
@@ -37,7 +37,7 @@ def round_off(bar):
 
 
 def set_stage():
-    """An ellipsoid of some 50,000 vertices with a handle that has moved."""
+    """An ellipsoid of about 50,000 vertices with a moved handle."""
     stage.empty_file()
     with stage.override():
         bar, _, moving = scenes.bar_with_handles()
@@ -61,7 +61,7 @@ def shape(bar):
 
 
 def one(rounds, name, folder):
-    """Seconds to the first picture of a moved mesh and to the last one, and how they differ."""
+    """Seconds to the first and to the last picture of a moved mesh, and their difference."""
     bar = set_stage()
     yield 2.0
     before, rest, written = stage.everything(), shape(bar), []
@@ -106,13 +106,13 @@ def one(rounds, name, folder):
 
 
 def seconds_to(drawn, written, begin):
-    """The first drawing that began after the shape was there."""
+    """Seconds to the first drawing that began after the shape was written."""
     after = [at - begin for at in drawn if written and at > written[0]]
     return round(after[0], 3) if after else None
 
 
 def until_job(reached):
-    """Until the running job has come so far, or has ended."""
+    """Waits until the running job has reached a state, or has ended."""
     yield from until(lambda: jobs.running() is None or reached(), LIMIT, jobs.progress)
 
 
@@ -121,7 +121,7 @@ def until_shown(bar, rest):
 
 
 def cancelled(name, folder):
-    """A job that is cancelled when its first result is there, over nothing and over a result before it."""
+    """Cancels a job after its first result, without and with an earlier result."""
     exact = []
     for earlier in (False, True):
         bar = set_stage()
@@ -141,7 +141,7 @@ def cancelled(name, folder):
 
 
 def with_steps_between(figures):
-    """A step that was pushed while the first result was shown holds nothing of it."""
+    """An undo step pushed while the first result is shown does not contain it."""
     bar = set_stage()
     yield 1.0
     before, rest = stage.everything(), shape(bar)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An animation rendered in the window while its source is live: each frame shows what the viewport shows, and
-the dependency graph of the render holds the source once."""
+"""Renders an animation in the window while its source is live: each frame agrees with the viewport, and the
+render's dependency graph contains the source once."""
 
 import bpy
 import numpy as np
@@ -11,7 +11,7 @@ from support.blender import scenes
 from addon.live import sessions
 
 FIRST, LAST = 1, 5
-SIZE, WIDTH = 240, 3.2  # of a picture in pixels, and of what it shows
+SIZE, WIDTH = 240, 3.2  # width of a picture in pixels, and in world units
 AGREES = 1.5 * WIDTH / SIZE  # one and a half pixels
 
 
@@ -99,7 +99,7 @@ def one(figures, folder, target):
 
 
 def height_in(path):
-    """How high what a picture shows reaches, in the world."""
+    """The height of the highest non-empty pixel of a picture, in world space."""
     image = bpy.data.images.load(str(path))
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)

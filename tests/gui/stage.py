@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the checks in Blender's window share: where to act, pictures, meters of time."""
+"""Helpers of the checks in Blender's window: positions, pictures, time measurement."""
 
 import contextlib
 import json
@@ -16,14 +16,14 @@ from verdicts import BEGUN, JUDGED, failures
 import addon
 from addon.names import PROPERTY
 
-PATIENCE = float(os.environ.get("ARAPFIELDS_PATIENCE", "1"))  # times the pauses, for a busy machine
-TAB = (1299, 340)  # where the sidebar's last tab lies in a window of 1600 × 1000
-LEAST = 100  # pixels of the sidebar; its tabs alone take fewer
+PATIENCE = float(os.environ.get("ARAPFIELDS_PATIENCE", "1"))  # factor of the pauses, for a busy machine
+TAB = (1299, 340)  # the sidebar's last tab in a window of 1600 × 1000
+LEAST = 100  # pixels of an open sidebar; tabs alone are narrower
 
 
 def start(steps, names, folder):
-    """Runs the generator `steps(found, folder)` of pauses in seconds beside Blender's events, with the add-on
-    switched on unless it is installed. Then leaves Blender; exit code 1, and a line each, for what is wrong.
+    """Runs the generator `steps(found, folder)`, which yields pauses in seconds, beside Blender's events,
+    with the add-on registered unless it is installed. Prints failures, and quits Blender with an exit code.
     """
     figures = {}
     bpy.context.preferences.view.show_splash = False
@@ -46,7 +46,7 @@ def start(steps, names, folder):
 
 
 def end(figures, names, folder):
-    """Judges the part that an error ended, or those that are not judged; leaves Blender."""
+    """Judges the part that an error ended, or those not yet judged, and quits Blender."""
     before = judged(folder)
     ended = [name for name in names if before.get(name) == BEGUN] or names[-1:]
     left = [name for name in names if before.get(name) in (None, BEGUN)]
@@ -61,7 +61,7 @@ def end(figures, names, folder):
 
 
 def judged(folder):
-    """{part: lines that name what is wrong}, of the parts that have begun."""
+    """{part: lines of failures} of the parts that have begun."""
     path = folder / JUDGED
     return json.loads(path.read_text()) if path.exists() else {}
 
@@ -96,8 +96,8 @@ def show_sidebar():
 
 
 def open_sidebar():
-    """Shows the sidebar and presses the panel's tab, where the window is large enough for that; pressed once
-    more, the tab would hide the panel."""
+    """Shows the sidebar and clicks the panel's tab, if the window is large enough; a second click would hide
+    the panel."""
     show_sidebar()
     yield 1.5
     if view()[0].width > TAB[0] and not is_panel_seen():
@@ -117,8 +117,8 @@ def look():
 
 
 def as_at_first(first):
-    """One window that looks as `first` tells at the bar and its handles, Blender's own tool in hand, and the
-    panel in sight, whatever ran before."""
+    """Restores one window with the view `first` of the bar and its handles, Blender's default tool, and the
+    visible panel."""
     for window in bpy.context.window_manager.windows[1:]:
         with bpy.context.temp_override(window=window):
             bpy.ops.wm.window_close()
@@ -140,7 +140,7 @@ def tool(*words):
 
 
 def picture(folder, name, part=None):
-    """A picture of the screen, or of a part of it: left, top, width, height."""
+    """Takes a picture of the screen, or of a part: left, top, width, height."""
     crop = ["-crop", "{2}x{3}+{0}+{1}".format(*part), "+repage"] if part else []
     subprocess.run(["import", "-window", "root", *crop, str(folder / f"{name}.png")], check=False)
 
@@ -155,7 +155,7 @@ def positions(name):
 
 
 def everything():
-    """Names of all that is in the file, and every mesh's positions, for comparison bit by bit."""
+    """Names of all data-blocks, and positions of all meshes, for comparison bit by bit."""
     names = {
         kind: sorted(getattr(bpy.data, kind).keys())
         for kind in ("objects", "meshes", "collections", "actions", "materials", "shape_keys")
@@ -170,7 +170,7 @@ def everything():
 
 
 def dense_bar(cuts=91):
-    """Makes the bar one of some 50,000 vertices."""
+    """Subdivides the bar to about 50,000 vertices."""
     import bmesh
 
     mesh, cube = bpy.data.objects["Bar"].data, bmesh.new()
@@ -183,14 +183,14 @@ def dense_bar(cuts=91):
 
 
 class Meter:
-    """Wall and processor time of the main thread in some of our functions."""
+    """Wall and processor time of the main thread in some functions of the add-on."""
 
     def __init__(self):
         self.wall, self.own, self._restore = [], [], []
 
     def watch(self, owner, name):
-        """Not for what Blender itself calls on its classes, as draw: it makes room for the arguments that a
-        function names, here none, and stores the first all the same, which damages its memory."""
+        """Not for methods that Blender calls on registered classes, as draw: it allocates as many arguments
+        as the function declares, here none, and writes the first one anyway, which corrupts memory."""
         original = getattr(owner, name)
 
         def timed(*given, **named):
@@ -220,7 +220,7 @@ class Meter:
 
 
 def gaps(seconds, figures, name):
-    """The longest time that a timer of 10 ms was late, while the event loop runs so long."""
+    """The largest delay of a timer of 10 ms while the event loop runs for `seconds`."""
     late, begin, last = [], time.perf_counter(), time.perf_counter()
     while time.perf_counter() - begin < seconds:
         yield 0.01
@@ -230,7 +230,7 @@ def gaps(seconds, figures, name):
 
 
 def redraw_seconds(count=5):
-    """Seconds of one redraw of the whole window, with nothing of ours in it."""
+    """Seconds of one redraw of the whole window, without drawing by the add-on."""
     with override():
         begin = time.perf_counter()
         for _ in range(count):
@@ -239,7 +239,7 @@ def redraw_seconds(count=5):
 
 
 def draws():
-    """A list that grows by the time of each drawing of the viewport, and what ends that."""
+    """(list that receives the time of each drawing of the viewport, function that ends that)."""
     times = []
     handler = bpy.types.SpaceView3D.draw_handler_add(
         lambda: times.append(time.perf_counter()), (), "WINDOW", "POST_PIXEL"

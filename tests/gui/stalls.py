@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How late the window's event loop is, taken apart: at rest, drawing, a job beside it, progress, previews.
+"""Delays of the window's event loop: at rest, when drawing, beside a job, by progress and previews.
 
-A timer of 10 ms tells the time that the event loop was held. Drawing of Blender's own counts as well, so each
-part is measured after the window has come to rest, without and with what a job has drawn.
+The delay of a timer of 10 ms measures how long the event loop was blocked. Blender's drawing counts as well:
+each part is measured after the window has come to rest, without and with a job's drawing.
 """
 
 import contextlib
@@ -81,18 +81,18 @@ def with_a_job(figures, name):
 
 
 def at_rest(calm=0.6, limit=60.0):
-    """Until nothing has been drawn for a while: Blender refines a picture over several drawings."""
+    """Waits until nothing has been drawn for a while: Blender refines pictures in several drawings."""
     times, stop = stage.draws()
     begin = now = busy = time.perf_counter()
     while now - max([busy, *times[-1:]]) < calm and now - begin < limit:
         yield 0.02
         before, now = now, time.perf_counter()
-        busy = now if now - before > 0.05 else busy  # sidebars and the like, which tell nobody
+        busy = now if now - before > 0.05 else busy  # drawing of sidebars and the like, without callbacks
     stop()
 
 
 def lateness(figures, name):
-    """How late a timer of 10 ms is, and how much of the time the event loop was held for over 50 ms."""
+    """Delay of a timer of 10 ms, and the share of time in which the event loop was blocked for over 50 ms."""
     late = []
     drawn, stop = stage.draws()
     begin = last = time.perf_counter()
@@ -113,7 +113,7 @@ def lateness(figures, name):
 
 
 def one_redraw(figures, kind):
-    """One redraw of a kind of region alone, by what it takes until the event loop comes round again."""
+    """Time of one redraw of one kind of region, until the next iteration of the event loop."""
     times = []
     for number in range(5):
         yield from at_rest()

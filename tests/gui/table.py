@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What users do to a source, a handle or a result at every stage of their use, in the window: a table.
+"""Actions of users on a source, a handle or a result in each stage, in the window, as a table.
 
-Each cell is begun in a new file with real jobs and timers, and judged as tests/blender/test_every_stage.py
-judges it. Writes table.md, and a sheet of pictures for each kind of object; a traceback in Blender's output
-follows the cell that it belongs to. A small window will do.
+Each cell begins in a new file with real jobs and timers, and is judged by the functions of
+tests/blender/test_every_stage.py. Writes table.md, and a sheet of pictures for each kind of object;
+tracebacks in Blender's output follow their cell. A small window is enough.
 """
 
 import subprocess
@@ -19,14 +19,14 @@ from addon.live import sessions
 WHICH = ("source", "handle", "result")
 STAGES = ("idle", "job", "live", "bake")
 WORK = {"field": "neural", "iterations": 600, "samples": 2000, "batch": 100, "width": 32, "layers": 2}
-FRAMES = 8  # of a bake
-LIMIT = 120.0  # seconds until a stage has to end
-WIDTH = 320  # pixels of a cell's picture
+FRAMES = 8  # frames of a bake
+LIMIT = 120.0  # time limit of a stage, in seconds
+WIDTH = 320  # width of a cell's picture in pixels
 
 
 def checks(figures, folder):
     cells = {}
-    bpy.context.preferences.system.viewport_aa = "OFF"  # a cell is no sight: its pictures are small
+    bpy.context.preferences.system.viewport_aa = "OFF"  # not needed for small pictures
     for which in WHICH:
         for action in ACTIONS:
             for name in STAGES:
@@ -34,7 +34,7 @@ def checks(figures, folder):
                 print("CELL", which, action, name, flush=True)
                 try:
                     yield from one(cell, which, action, name)
-                except Exception as error:  # the next cell is tried all the same
+                except Exception as error:  # goes on with the next cell
                     cell["wrong"] = f"{type(error).__name__}: {error}"
                 print(cell, flush=True)
                 picture(folder / f"cell-{which}-{action}-{name}.png")
@@ -48,7 +48,7 @@ def checks(figures, folder):
 
 
 def picture(file):
-    """Of the 3D view alone, small."""
+    """Takes a small picture of the 3D view."""
     window, _, region = stage.view()
     geometry = subprocess.run(
         ["xdotool", "getdisplaygeometry"], check=False, capture_output=True, text=True
@@ -139,7 +139,7 @@ def judge(cell, action, name, which, said):
 
 
 def begin(which, name):
-    """The bar with its handles at that stage, and with a result where that is what is worked on."""
+    """Puts the bar with its handles into a stage, with a result if the action is on that."""
     with stage.override():
         bar, _, moving = scenes.bar_with_handles()
         for option, value in WORK.items():
@@ -171,7 +171,7 @@ def begin(which, name):
 
 
 def is_at_work():
-    """Whether the worker has set out; its work may have ended at once."""
+    """Whether the worker has started; it may have ended already."""
     job = jobs.running()
     return job is None or 0 < job.fraction < 1
 
@@ -186,7 +186,7 @@ def at_stage(name):
 
 
 def drag_on():
-    """The handle goes on to move, where it is still there."""
+    """Moves the handle further if it still exists."""
     moving = bpy.context.scene.objects.get("Moving") or bpy.context.scene.objects.get("Other Name")
     if moving is not None and moving.type == "EMPTY" and moving.library is None:
         moving.location.z += 0.1
@@ -222,7 +222,7 @@ def text(cell):
 
 
 def sheet(folder, which):
-    """One picture of all cells of a kind of object, by ImageMagick's montage."""
+    """Joins the pictures of all cells of a kind of object by ImageMagick's montage."""
     files = [folder / f"cell-{which}-{action}-{name}.png" for action in ACTIONS for name in STAGES]
     words = [word for file in files if file.exists() for word in ("-label", file.stem[5:], str(file))]
     command = ["montage", *words, "-tile", f"{len(STAGES)}x", "-geometry", "+2+2"]

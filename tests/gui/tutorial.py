@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tutorial of docs/tutorial.md, step by step in a real Blender's window; makes its pictures.
+"""Performs the steps of docs/tutorial.md in Blender's window, and makes its pictures.
 
 Pictures need ImageMagick's `import`, and xdotool for the mouse. A window of 1600 × 1000 is assumed.
 """
@@ -19,7 +19,7 @@ SHOWN = (0, 0, 1316, 905)  # the viewport with its sidebar
 
 
 def look():
-    """The view shows Suzanne from her left front, beside the sidebar."""
+    """Sets the view to Suzanne from her left front, beside the sidebar."""
     with stage.override():
         view = bpy.context.area.spaces.active.region_3d
         view.view_perspective, view.view_distance = "PERSP", 6.0

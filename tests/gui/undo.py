@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rounds of undo and redo with the pin tool in hand: after drags, right after and during them, Esc in others.
+"""Rounds of undo and redo with the active pin tool: after drags, right after and during them, and after Esc.
 
-Each state is compared with what it was, bit for bit: names of all that is in the file, positions, places, the
-handles and the shape.
+States are compared bit by bit: names of all data-blocks, positions, transforms, the handles and the shape.
 """
 
 import bpy
@@ -11,12 +10,12 @@ from mouse import drag, is_dragging, pixel, release, until
 from pins import END, set_stage, state
 
 ROUNDS = 100
-STRIDE = 5  # states from one print to the next
+STRIDE = 5  # states between prints
 
 
 def checks(figures, folder, kinds=("rested", "within", "escaped")):
-    """`kinds`: which rounds are played, of these."""
-    bpy.context.preferences.system.viewport_aa = "OFF"  # it is the steps that are looked at
+    """`kinds`: the rounds to run."""
+    bpy.context.preferences.system.viewport_aa = "OFF"  # not needed for undo steps
     bar = set_stage()
     yield 0.5
     before, spot = state(), pixel(END)
@@ -49,7 +48,7 @@ def record(figures, name, exact):
 
 
 def rested(figures, before, after):
-    """Undo and redo of a drag that has come to rest."""
+    """Undo and redo of a drag whose shape is at rest."""
     exact = []
     for _ in range(ROUNDS):
         for key, expected in (("ctrl+z", before), ("ctrl+shift+z", after)):
@@ -60,8 +59,8 @@ def rested(figures, before, after):
 
 
 def within(figures, after):
-    """Keys pressed while the button is down go nowhere; undo right after the release takes that drag back,
-    redo brings it again, and undo takes it back."""
+    """Keys have no effect while the button is pressed; undo right after the release reverts the drag, redo
+    restores it, and undo reverts it again."""
     exact = []
     for number in range(ROUNDS):
         spot = pixel(bpy.data.objects["Bar"].arapfields.handles[0].empty.location)
@@ -74,7 +73,7 @@ def within(figures, after):
         yield 0.05
         held = held and is_dragging()
         stage.tool("mouseup", 1)
-        yield 0.05 * (number % 4)  # also before the shape has come to rest
+        yield 0.05 * (number % 4)  # also before the shape is at rest
         stage.tool("key", "ctrl+z")
         yield from until(lambda: state() == after and not is_dragging(), 5.0)
         exact.append(held and state() == after)
@@ -89,7 +88,7 @@ def within(figures, after):
 
 
 def escaped(figures, after):
-    """Esc in the midst of a drag."""
+    """Esc during a drag."""
     exact = []
     for number in range(ROUNDS):
         spot = pixel(bpy.data.objects["Bar"].arapfields.handles[0].empty.location)

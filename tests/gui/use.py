@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces of boxes, search and the status bar, as the mouse finds them."""
+"""Faces of boxes, search and the status bar, by mouse."""
 
 import bpy
 import jobs as window_jobs
@@ -27,7 +27,7 @@ def edge_points(empty, count):
 
 
 def face(figures, folder):
-    """A face of the active box is dragged outwards: one undo step, and the handle holds more."""
+    """Drags a face of the active box outwards: one undo step, and the handle holds more samples."""
     stage.empty_file()
     with stage.override():
         bar, fixed, _ = scenes.bar_with_handles()
@@ -61,7 +61,7 @@ def face(figures, folder):
 
 
 def search(figures, folder):
-    """Blender's search finds us by our name and by what we do."""
+    """Blender's search finds the operators by the add-on's name and by their function."""
     for words in ("arap", "deform", "stylize"):
         stage.tool("mousemove", 400, 600)
         yield 0.5
@@ -77,7 +77,7 @@ def search(figures, folder):
 
 
 def cancel(figures, folder):
-    """The status bar's button ends a job, whatever the sidebar shows."""
+    """The status bar's button cancels a job, also without the panel."""
     window, area, _ = stage.view()
     area.spaces.active.show_region_ui = False
     window_jobs.invoke(window_jobs.LONG)

@@ -1,23 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each check in Blender's window must have found, and the verdict on it. Needs no Blender."""
+"""Expected results of each check in Blender's window. Needs no Blender."""
 
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
 
-JUDGED = "judged.json"  # in the folder: {part: lines that name what is wrong}
-BEGUN = ["it broke off"]  # these lines until the part has ended
+JUDGED = "judged.json"  # file in the folder: {part: lines of failures}
+BEGUN = ["it broke off"]  # lines of a part that has not ended
 
 
 @dataclass(frozen=True)
 class Rule:
-    """A condition on what a check found, and how it reads."""
+    """A condition on a result, with its description."""
 
     text: str
     holds: Callable
 
     def each(self, count=None):
-        """The same of every entry of a list, of so many if that is said."""
+        """A rule for every entry of a list, of length `count` if given."""
         return Rule(
             f"each {self.text}",
             lambda figures: count in (None, len(figures)) and all(map(self.holds, figures)),
@@ -37,7 +37,7 @@ def below(most):
 
 
 def near(value, by):
-    """Of either sign: turns depend on the side that a view is from."""
+    """Close to a value, of either sign: signs of rotations depend on the view."""
     return Rule(f"{value:g} ± {by:g}", lambda figures: abs(abs(figures) - value) <= by)
 
 
@@ -48,7 +48,7 @@ def having(**rules):
 
 
 def plain(value):
-    """As a file of JSON keeps it: pairs are lists."""
+    """The value as read from JSON: tuples are lists."""
     return json.loads(json.dumps(value))
 
 
@@ -75,7 +75,7 @@ UNDONE = {
     "undo_leaves": is_((["Bar"], [])),
 }
 WITHIN, ESCAPED = {"undo_within_drags": ALL_EXACT}, {"undo_escaped": ALL_EXACT}
-EXPECTED = {  # of each part, every entry that it finds
+EXPECTED = {  # {part: {result: rule}}, complete
     "panel": {"panel_seen": TRUE, "languages": above(0), "sections": above(10)},
     "labels": all_of(EMPTY, "cut_en_US", "cut_de_DE", "cut_narrow_en_US", "cut_narrow_de_DE"),
     "use": {
@@ -191,7 +191,7 @@ EXPECTED = {  # of each part, every entry that it finds
 
 
 def failures(figures, parts):
-    """Lines that name what is wrong: an error, what is missing, and what is not as expected."""
+    """Lines of failures: errors, missing and unexpected results."""
     lines = [figures["error"]] if "error" in figures else []
     for part in parts:
         for name, rule in EXPECTED[part].items():

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tutorial walked by mouse and keys alone, and what a newcomer finds us by; a picture after each step.
+"""Performs the tutorial by mouse and keys only, and searches as a new user does; a picture after each step.
 
-For the first words that the extension says, it is installed; else the add-on of this clone is switched on. A
-window of 1600 × 1000 is assumed.
+If the extension is installed, its first messages are shown; else this clone's add-on is registered. A window
+of 1600 × 1000 is assumed.
 """
 
 import bpy
@@ -16,12 +16,12 @@ from tutorial import EAR, JAW
 
 from addon.live import sessions
 
-F3, MINUS = "69", "20"  # their codes: by their names the X server may press Alt too
+F3, MINUS = "69", "20"  # key codes: by name the X server may press Alt as well
 MIDDLE = (560, 520)  # of the 3D view
-# In the sidebar with one section open alone: the list's + and its rows, Deform and Stylize.
+# Positions in the sidebar with one open section: the list's + and its rows, Deform and Stylize.
 PLUS, FROM_EMPTIES, SECOND_ROW = (1261, 159), (1340, 180), (1130, 181)
 DEFORM, STYLIZE = (1140, 223), (1140, 343)
-FIT, FIT_SURFACE = (1252, 25), (1130, 80)  # below the header of Implicit Surface, within Advanced
+FIT, FIT_SURFACE = (1252, 25), (1130, 80)  # below the header of Implicit Surface in Advanced
 
 
 def words(text, pause=1.0):
@@ -30,7 +30,7 @@ def words(text, pause=1.0):
 
 
 def number(value):
-    """Types a number into Blender's transform and confirms it."""
+    """Types a number during a transform, and confirms it."""
     yield from words(f"{abs(value):g}", 0.5)
     if value < 0:
         yield from keys(MINUS, pause=0.3)
@@ -43,7 +43,7 @@ def over_the_view():
 
 
 def searched(text):
-    """F3 and some words: Return then does what the first line found does."""
+    """Presses F3 and types a text; Return then runs the first result."""
     yield from over_the_view()
     yield from keys(F3, pause=2.0)
     yield from words(text, 2.0)
@@ -68,7 +68,7 @@ def found_by_name(figures, folder):
 
 
 def monkey(figures, folder):
-    for item in list(bpy.data.objects):  # the tutorial begins with Suzanne alone
+    for item in list(bpy.data.objects):  # the tutorial begins with only Suzanne
         item.select_set(item.type == "MESH")
     yield from over_the_view()
     yield from keys("x", pause=1.0)
@@ -89,7 +89,7 @@ def monkey(figures, folder):
 
 
 def cube_empty(folder, location, scale, picture=""):
-    """Add › Empty › Cube by what is typed into the menu, then G and S an axis at a time."""
+    """Adds an Empty by typing into the Add menu, then moves and scales it along each axis."""
     yield from over_the_view()
     yield from keys("shift+a", pause=1.5)
     yield from words("empty cube", 1.5)
@@ -104,7 +104,7 @@ def cube_empty(folder, location, scale, picture=""):
 
 
 def spot(item):
-    """A pixel at which a click means that object."""
+    """A pixel at which a click selects that object."""
     if item.type == "EMPTY":
         return pixel(next(use.edge_points(item, 1)))
     points = scenes.world_points(item)
@@ -140,7 +140,7 @@ def handles(figures, folder):
 
 
 def surface(figures, folder):
-    """The tutorial's fifth step as far as the fit."""
+    """The tutorial's fifth step, up to the fit."""
     suzanne = next(item for item in bpy.data.objects if item.type == "MESH")
     yield from panel.open_alone({"advanced"})
     row = panel.rows().index("advanced") + 1
@@ -156,7 +156,7 @@ def surface(figures, folder):
 
 
 def inner(section, row):
-    """Opens a section within Advanced; where its header is, from the top."""
+    """Opens a section in Advanced; returns the position of its header from the top."""
     place = panel.rows(panel.ADVANCED).index(section)
     yield from panel.press(row, place)
     return round(panel.HEADER[1] + panel.STEP * row + panel.INNER * place)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which labels of the panel Blender would cut off, by its own font: texts against the sidebar's width."""
+"""Finds labels of the panel that Blender would truncate: widths of texts in its font and of the sidebar."""
 
 from pathlib import Path
 
@@ -11,13 +11,13 @@ from support.blender import panels
 from addon.blender.section import Advanced
 from addon.names import CONTEXT
 
-MARGINS, LABELS = 47, 0.4  # pixels of tabs and edges; share of the rest that labels before values have
+MARGINS, LABELS = 47, 0.4  # pixels of tabs and edges; share of the rest for labels before values
 ICON, PADDING = 20, 8  # pixels at a scale of 1
 
 
 def checks(figures, folder):
-    """At the sidebar's first width, with all methods' settings in sight, in English and in German; made
-    narrow by mouse, what is not advanced."""
+    """At the default width all settings, in English and German; at a narrower one, set by mouse, those that
+    are not advanced."""
     bar, interface = bpy.data.objects["Bar"].arapfields, bpy.context.preferences.view
     bar.surface = "FIT"
     bar.deform.field = bar.stylize.field = "neural"
@@ -61,7 +61,7 @@ def narrower(step=8):
 
 
 class Measured(panels.Layout):
-    """Notes (text, pixels that there are for it) of what it is asked to show."""
+    """Replaces a layout: collects (text, pixels available for it)."""
 
     def __init__(self, found, width, row=None):
         super().__init__([])
@@ -101,7 +101,7 @@ class Measured(panels.Layout):
             self.note(text, self.width - ICON)
 
     def template_list(self, *_, **__):
-        """Rows have names of the user's."""
+        """Rows contain names given by the user."""
 
     def row(self, heading="", **_):
         if heading:
@@ -118,7 +118,7 @@ class Measured(panels.Layout):
 
 
 def of_rows(found, row):
-    """Buttons of a row that have words share what those without leave."""
+    """Buttons with a text share the width that buttons without one leave."""
     words = [(text, icon) for text, icon in row.buttons if text]
     left = row.width - ICON * (len(row.buttons) - len(words))
     for text, icon in words:
@@ -126,8 +126,7 @@ def of_rows(found, row):
 
 
 def cut(everyday=False):
-    """Texts of the sections as they show now that are wider than their place; `everyday`: not of advanced
-    ones."""
+    """Texts of the shown sections that are wider than their place; `everyday`: without advanced ones."""
     window, area, _ = stage.view()
     region = next(one for one in area.regions if one.type == "UI")
     scale = bpy.context.preferences.system.ui_scale

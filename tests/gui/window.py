@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run by a real Blender with a window: the parts named, or all that share one. docs/development.md says how.
+"""Script for Blender with a window: runs the named parts, or all that can share one. See docs/development.md.
 
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER [PART ...]
 blender --factory-startup --python tests/gui/window.py -- OUTPUT_FOLDER film=PINS.blend
-Writes checks.json, judged.json and pictures, says what is wrong, and leaves Blender with exit code 1 then.
-tests/gui/verdicts.py has what each part must find. ImageMagick's `import` takes pictures; xdotool moves the
+Writes checks.json, judged.json and pictures, prints failures, and quits Blender; exit code 1 on failure.
+tests/gui/verdicts.py contains the expected results. ImageMagick's `import` takes pictures; xdotool moves the
 mouse.
 """
 
@@ -33,7 +33,7 @@ SHORTER = {
     "undo-within": ("undo", {"kinds": ("within",)}),
     "undo-escaped": ("undo", {"kinds": ("escaped",)}),
 }
-ALONE = ("film", "pose", "walk", "tutorial")  # each in a Blender of its own
+ALONE = ("film", "pose", "walk", "tutorial")  # each in a separate Blender
 
 
 def checks(module, **given):
@@ -41,9 +41,9 @@ def checks(module, **given):
 
 
 def together(figures, folder, names):
-    """Yields seconds to wait, in which Blender's event loop runs. Ends with a job, which must not hold it."""
+    """Yields seconds to wait, in which Blender's event loop runs. The last job must not delay the exit."""
     first = stage.look()
-    for name in sorted(names, key="endings".__eq__):  # of which all that follows is one
+    for name in sorted(names, key="endings".__eq__):  # last: the code below continues it
         stage.record(name, stage.BEGUN, folder)
         yield from stage.as_at_first(first)
         module, given = {**TOGETHER, **SHORTER}[name]
@@ -57,7 +57,7 @@ def together(figures, folder, names):
     with stage.override():
         scenes.bar_with_handles()
         bpy.ops.arapfields.live("INVOKE_DEFAULT")
-        bpy.data.objects["Bar"].arapfields.result = "NEW"  # the live one itself would refuse
+        bpy.data.objects["Bar"].arapfields.result = "NEW"  # refused for the live object itself
         bpy.ops.arapfields.deform("INVOKE_DEFAULT", **scenes.NEW | {"iterations": 200000})
     yield 0.5
 

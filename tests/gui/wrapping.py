@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wrap by mouse: the target chosen, landmarks clicked, the press, Esc, Factor, undo, a file opened again, and
-a sequence of scans."""
+"""Wrap by mouse: target, landmarks, Wrap, Esc, Factor, undo, reopening of the file, a sequence of scans."""
 
 import shutil
 import time
@@ -18,11 +17,11 @@ from addon.blender import modifier_stack
 from addon.core.runtime import jobs
 
 SCAN_AT = Vector((2.0, 0, 0))
-# In the sidebar, of a window of 1600 × 1000, with Wrap alone open.
+# Positions in the sidebar of a window of 1600 × 1000, with only Wrap open.
 EYEDROPPER, BUTTON, WRAP = (1263, 240), (1155, 286), (1155, 517)
 TRANSFER = (1165, 722)
-SEQUENCE = (1155, 825)  # the same of an object that is wrapped, its bones fitted
-SETTLED = 1.5  # seconds in which the sidebar's sections slide to where they stay
+SEQUENCE = (1155, 825)  # for a wrapped object with fitted bones
+SETTLED = 1.5  # seconds until the sidebar's sections have stopped moving
 
 
 def checks(figures, folder):
@@ -33,7 +32,7 @@ def checks(figures, folder):
 
 
 def set_stage():
-    """The rigged, textured body and beside it the scan, from the front, with Wrap alone open."""
+    """Shows the rigged, textured body and the scan beside it from the front, with only Wrap open."""
     stage.empty_file()
     with stage.override():
         body, rig = wraps.rigged_character()
@@ -65,7 +64,7 @@ def chequered():
 
 
 def choose_target(figures, folder):
-    """With the eyedropper beside Onto, on the scan."""
+    """Chooses the scan by the eyedropper beside Onto."""
     body, scan = bpy.data.objects["Body"], bpy.data.objects["Scan"]
     yield from click(EYEDROPPER)
     yield from click(pixel(SCAN_AT + Vector((0, -0.2, 1.2))))
@@ -73,7 +72,7 @@ def choose_target(figures, folder):
 
 
 def click_landmarks(figures, folder):
-    """Five pairs; the first half and the first pair are taken back by Backspace and clicked again."""
+    """Clicks five pairs; the first half and the first pair are removed by Backspace and clicked again."""
     entries = bpy.data.objects["Body"].arapfields.wrap.landmarks
     pairs = [(Vector(rest), SCAN_AT + Vector(goal)) for rest, goal in wraps.landmarks_of_people()]
     middle = [Vector((0, 0, 1.0)), SCAN_AT + Vector((0, 0, 1.2))]
@@ -102,7 +101,7 @@ def click_landmarks(figures, folder):
 
 
 def inward(end, middle, by=0.03):
-    """The pixel of a place just within the outline."""
+    """The pixel of a point just inside the outline."""
     return pixel(end + by * (middle - end).normalized())
 
 
@@ -111,7 +110,7 @@ def shape():
 
 
 def press(figures, folder):
-    """Esc during the first wrap, then one to its end: undone, redone, posed, with its target gone."""
+    """Presses Esc in the first wrap; a complete one is undone, redone and posed, then loses its target."""
     body, rig = bpy.data.objects["Body"], bpy.data.objects["Rig"]
     rest, bones = shape(), wraps.joints(rig, posed=False)
     yield from click(WRAP, pause=1.0)
@@ -152,13 +151,13 @@ def press(figures, folder):
 
 
 def hand_on(figures, folder):
-    """Transfer to Target, undone and redone: the scan has the body's groups and an armature of its own."""
+    """Transfer to Target with undo and redo: the scan has the body's groups and a separate armature."""
 
     def given():
         scan = bpy.data.objects["Scan"]
         return len(scan.vertex_groups), [m.type for m in scan.modifiers]
 
-    bpy.data.objects["Body"].arapfields.wrap.transfer -= {"KEYS"}  # Mirror changes the vertices
+    bpy.data.objects["Body"].arapfields.wrap.transfer -= {"KEYS"}  # refused: Mirror changes the vertices
     before = given()
     yield from click(TRANSFER, pause=0.5)
     yield from until_idle(60.0)
@@ -170,11 +169,11 @@ def hand_on(figures, folder):
     figures["wrap_transfer_undone"] = given() == before
     yield from keys("ctrl+shift+z", pause=1.5)
     figures["wrap_transfer_redone"] = given() == after
-    yield from keys("ctrl+z", pause=1.5)  # the armature poses the scan, and landmarks stay
+    yield from keys("ctrl+z", pause=1.5)  # the armature poses the scan; landmarks stay
 
 
 def target_gone(figures, folder):
-    """The target is deleted while the object is wrapped onto it again; then the file is opened again."""
+    """Deletes the target while the object is wrapped onto it again; then reopens the file."""
     yield from click(WRAP, pause=1.0)
     was_running = jobs.running() is not None
     bpy.data.objects.remove(bpy.data.objects["Scan"])
@@ -191,7 +190,7 @@ def target_gone(figures, folder):
 
 
 def sequence(figures, folder):
-    """A scan that rises from frame 1 to frame 2: Esc in the first frame, then to the end; undone."""
+    """Wrap Sequence onto a scan that rises from frame 1 to 2: Esc in the first frame, then complete; undo."""
     body = bpy.data.objects["Body"]
     shutil.rmtree(folder / "cache", ignore_errors=True)
     with stage.override():
@@ -201,7 +200,7 @@ def sequence(figures, folder):
             scan, _ = wraps.scan_of(wraps.grown_parts())
             scan.name, scan.location = f"scan_{number}", SCAN_AT + Vector((0, 0, 0.1 * number))
             home.objects.link(scan)
-        for entry in body.arapfields.wrap.landmarks:  # their places went with the target
+        for entry in body.arapfields.wrap.landmarks:  # the target's landmarks were deleted with it
             bpy.data.objects.remove(entry.on_target)
         scenes.activate(body)
         bpy.ops.ed.undo_push(message="scans")
