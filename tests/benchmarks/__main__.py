@@ -45,12 +45,12 @@ def machine():
 
 
 def earlier():
-    """What earlier runs found, {} where there are none."""
+    """The results of earlier runs; {} without any."""
     return json.loads(TARGET.read_text()) if TARGET.exists() else {}
 
 
 def keep(results):
-    """Writes the file anew, whole or not at all: a run may be stopped at any time."""
+    """Replaces the file of results atomically, as a run may be stopped at any time."""
     TARGET.parent.mkdir(exist_ok=True)
     partial = TARGET.with_suffix(".partial")
     partial.write_text(json.dumps(results, indent=1))
@@ -58,7 +58,7 @@ def keep(results):
 
 
 def run(name):
-    """A section's rows, or why it is left out and whether that is an error of ours."""
+    """A section's rows, or the reason why it is left out, and whether that is an error."""
     try:
         return importlib.import_module(f"tests.benchmarks.{name}").run(), None, False
     except ModuleNotFoundError as error:

@@ -27,7 +27,7 @@ def live(name):
 
 
 def drag(name):
-    """There and back: what a live step takes."""
+    """Live steps of a drag there and back."""
     live(name).reset()
     for degrees in [*DRAG, *reversed(DRAG)]:
         live(name).solve(targets(name, degrees))
@@ -38,7 +38,7 @@ def deform(name, **options):
 
 
 def neural(batch):
-    """Iterations of a network at so many samples."""
+    """Iterations of a network with `batch` samples."""
     deform("bunny", field="neural", batch=batch, iterations=max(4, 12000 // batch))
 
 
@@ -47,7 +47,7 @@ def wrap():
     af.wrap(af.sample_mesh(vertices, triangles), af.MeshSdf(*target), [], af.WrapOptions(iterations=12))
 
 
-WORK = {  # with as many steps by either backend: where a descent ends depends on last digits
+WORK = {  # with the same numbers of steps: the end of a descent depends on rounding
     "default deform of the bunny": functools.partial(deform, "bunny", iterations=20),
     "default deform of spot": functools.partial(deform, "spot", iterations=20),
     "cube style of spot": lambda: af.stylize(
@@ -64,7 +64,7 @@ WORK = {  # with as many steps by either backend: where a descent ends depends o
 
 
 def serve():
-    """Does the work named by each line of the input; prints its processor seconds."""
+    """Runs the work named by each line of the input; prints its processor time in seconds."""
     for line in sys.stdin:
         with Clock() as clock:
             WORK[line.strip()]()

@@ -36,7 +36,7 @@ def work(name):
 
 
 def measure(name, first, rounds):
-    """In a process of its own: prints the seconds alone and beside busy processes, taken in turn."""
+    """In a separate process: prints the seconds alone and beside busy processes, measured alternately."""
     if first == "torch":
         import torch  # noqa: F401  (it decides how OpenMP is set up)
 
@@ -60,7 +60,7 @@ def measure(name, first, rounds):
 
 
 def slowdown(name, first, rounds=5):
-    """(seconds alone, seconds beside the others, median of their ratios), with `first` imported before us."""
+    """(seconds alone, seconds beside the others, median of the ratios); `first`: module imported before."""
     run = subprocess.run(
         [sys.executable, "-c", CODE, name, first, str(rounds)], capture_output=True, text=True, check=True
     )

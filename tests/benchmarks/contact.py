@@ -16,7 +16,7 @@ from . import shapes
 
 
 def solve(case, rest, triangles, contact, options=None):
-    """(places of the vertices, field, processor seconds)"""
+    """(moved vertices, field, processor seconds)"""
     samples = af.sample_mesh(rest, triangles, 20_000, seed=0)
     begin = time.process_time()
     if not case.frames:
@@ -32,7 +32,7 @@ def solve(case, rest, triangles, contact, options=None):
 
 
 def errors(case, rest, moved, held):
-    """Of the handles that nothing holds back, the largest mean error at the vertices inside."""
+    """The largest mean error at the vertices inside a handle, of handles that contact does not hold back."""
     found = [0.0]
     ones = np.ones((len(rest), 1))
     for i, handle in enumerate(case.handles):

@@ -18,7 +18,7 @@ from . import shapes
 from .shapes import cases
 
 VERTICES, FRESH, FRESH_SEED = 50_000, 50_000, 99
-# What the first result is made of, as native/solve/radial/full_solve.cpp has it.
+# The first result, as in native/solve/radial/full_solve.cpp.
 FEW = {
     "fine_centers": 500,
     "coarse_centers": 100,
@@ -26,9 +26,9 @@ FEW = {
     "handle_samples": 1024,
     "iterations": 20,
 }
-REFERENCE_SAMPLES = 40_000  # they carry as many centers
+REFERENCE_SAMPLES = 40_000  # samples for that many centers
 REFERENCE = af.DeformOptions(field="radial", centers=2900, iterations=2000)
-# Box held, box moved, axis and pivot of its turn by FULL degrees, for a half-extent of 0.75.
+# Fixed box, moved box, axis and pivot of its rotation by FULL degrees, for a half extent of 0.75.
 DRAGS = {
     "shiba": ([[-1, -1, -1], [1, 1, -0.2]], [[0, -1, 0.2], [1, 1, 1]], [0, 0, 1], (0.3, 0, 0.2)),
     "dinosaur": shapes.OUR_DRAGS["bunny"],
@@ -43,7 +43,7 @@ DRAGS = {
 
 
 def surface(name):
-    """A mesh of about VERTICES vertices."""
+    """A mesh with about VERTICES vertices."""
     sdf = af.MeshSdf(*shapes.own_mesh(name)) if name in shapes.CREATURES else shapes.sdf(name)
     rough, _ = af.extract_surface(sdf, 64)
     return af.extract_surface(sdf, round(64 * (VERTICES / len(rough)) ** 0.5))
@@ -56,7 +56,7 @@ def handles_of(name):
 
 
 class Yardstick:
-    """Measures fields of one shape: energy and folds at fresh samples, and how far handles are missed."""
+    """Measures fields of one shape: energy and folds at new samples, and errors of handles."""
 
     def __init__(self, mesh, handles):
         self.fresh = af.sample_mesh(*mesh, count=FRESH, seed=FRESH_SEED)
@@ -84,7 +84,7 @@ class Yardstick:
 
 
 class Press:
-    """One default deform of the mesh from the press on; when its first result came, and when its last."""
+    """A default deform of the mesh, with the times of its first and its last result since the press."""
 
     def __init__(self, mesh, handles, options):
         task, begin, ended = af.Task(), (time.perf_counter(), time.process_time()), threading.Event()
@@ -113,7 +113,7 @@ class Press:
 
 
 def reference_energy(name, mesh, handles, yardstick):
-    """That of REFERENCE; kept, since it takes minutes."""
+    """The energy of REFERENCE; cached, as it takes minutes."""
     file = shapes.ROOT / "build" / "bench" / f"reference-{name}.npz"
     if not file.exists():
         samples = af.sample_mesh(*mesh, count=REFERENCE_SAMPLES)

@@ -18,7 +18,7 @@ BENDING, HANDLE_WEIGHT = 0.01, 100.0
 
 
 class Bar(NamedTuple):
-    """What counts as good."""
+    """Thresholds of energy and handle error."""
 
     energy: float
     handle_error: float
@@ -41,7 +41,7 @@ class Bar(NamedTuple):
 
 
 def their_network(width=256):
-    """The same architecture in PyTorch, output layer at zero, as autograd needs it."""
+    """The same architecture in PyTorch for autograd, with zero output layer."""
     import torch
 
     class Network(torch.nn.Module):
@@ -64,7 +64,7 @@ def their_network(width=256):
 
 
 def energy_row(samples, count):
-    """The energy and its parameter gradient alone, on as many samples."""
+    """The energy and its parameter gradient on `count` samples."""
     import iarap
     import torch
 
@@ -84,7 +84,7 @@ def energy_row(samples, count):
 
 
 class TheirLoop:
-    """The same loop over iarap's energy with Adam (its stretch is a third of the paper's)."""
+    """The same loop with iarap's energy (its stretch is a third of the paper's) and Adam."""
 
     def __init__(self, samples, handles, count):
         import torch
@@ -118,7 +118,7 @@ class TheirLoop:
         self.optimizer.step()
 
     def quality(self, count=1500):
-        """Energy and mean handle error, as af.deform's report has them."""
+        """Energy and mean handle error, as in the report of af.deform."""
         import torch
 
         energy = float(self.energy(self.points[:: max(1, len(self.points) // count)]).detach())
@@ -127,7 +127,7 @@ class TheirLoop:
         return energy, float(apart.mean())
 
     def run_to_quality(self, bar, every=20, most=600):
-        """Iterations and seconds until the bars hold; the looks in between are not counted."""
+        """Iterations and seconds until the thresholds are met, without the time of these checks."""
         seconds = 0.0
         iteration = 0
         while iteration < most:

@@ -48,7 +48,7 @@ def points_of(vertices, triangles):
 
 
 def run(rounds=3):
-    """A row a mesh and kind of points: thousand points a second of both, and how much faster ours is."""
+    """A row per mesh and kind of points: thousand points per second of both, and their ratio."""
     rows = []
     for name, (vertices, triangles) in cases():
         triangles = triangles.astype(np.int64)

@@ -19,20 +19,20 @@ from . import shapes
 from .live_cases import inside
 from .shapes import cases
 
-CENTERS = 1200  # of the oracle's fine scale
+CENTERS = 1200  # centers of the oracle's fine scale
 SAMPLES_A_CENTER = 8
 FRESH, FRESH_SEED = 20_000, 7
-MOST_POINTS = {"places": 300, "boxes": 90}  # a handle
-NEGLIGIBLE = 1e-9  # of the largest singular value of the constraints
+MOST_POINTS = {"places": 300, "boxes": 90}  # per handle
+NEGLIGIBLE = 1e-9  # relative to the largest singular value of the constraints
 STEPS = 120
-FINE = {"centers": 2900, "margin": 0.05}  # of exact handles beside the oracle, on
+FINE = {"centers": 2900, "margin": 0.05}  # settings of exact handles compared with the oracle
 FINE_SAMPLES = 40_000
-SINGLE = 1e-7  # what single precision leaves of the largest curvature
+SINGLE = 1e-7  # single precision, relative to the largest curvature
 VALUE, FIRST, SECOND = 1, 4, 10  # columns of jets
 
 
 def energy_of(jets, bending):
-    """Mean energy of jets (10, n, 3), and its cotangents."""
+    """(mean energy of jets (10, n, 3), its cotangents)."""
     return testing.arap_energy_by_points(np.ascontiguousarray(jets), 1.0, np.ones(len(bending)), bending)
 
 
@@ -55,7 +55,7 @@ class Oracle:
         self.bending = testing.bending(samples, options)[chosen]
         self.rows = testing.radial_rows(self.soft, samples.points[chosen], SECOND).astype(np.float32)
         self.fresh, self.fresh_bending = fresh.points, testing.bending(fresh, options)
-        # Of the soft solution: its values and slopes decide them.
+        # At the soft solution, by its values and derivatives.
         wanted = testing.field_jets(self.soft, samples.points[chosen], SECOND)[:4].reshape(-1, 3)
         known = self.rows[: len(wanted)].astype(float)
         normal = known.T @ known
@@ -77,7 +77,7 @@ class Oracle:
         return np.concatenate(rows), np.concatenate(targets)
 
     def least(self, kind):
-        """Energy at fresh samples, and the largest violation of a constraint."""
+        """(energy at new samples, largest violation of a constraint)."""
         rows, targets = self.constraints(kind)
         left, values, right = linalg.svd(rows, full_matrices=True)
         rank = int((values > NEGLIGIBLE * values[0]).sum())
@@ -86,7 +86,7 @@ class Oracle:
         count = len(self.bending)
         basis = (self.rows @ free.astype(np.float32)).reshape(SECOND, count, -1)
         offset = (self.rows.astype(float) @ fixed).reshape(SECOND, count, 3)
-        # Whitened by the energy's second derivatives at rest.
+        # Preconditioned by the energy's second derivatives at rest.
         scale = np.array([1, 1, 1, 1, 1, 1, 2, 2, 2], np.float32)[:, None] * np.ones(count, np.float32)
         scale[3:] *= self.bending
         weighted = (np.sqrt(scale / count)[..., None] * basis[1:]).reshape(-1, free.shape[1])
@@ -116,7 +116,7 @@ class Oracle:
 
 
 def random_pair(points, seed):
-    """A box about one place of the surface that stays, and one about another that turns and moves."""
+    """A fixed box around one point of the surface, and a moved and rotated box around another."""
     rng = np.random.default_rng(seed)
     a, b = points[rng.integers(len(points), size=2)]
     while np.abs(a - b).max() < 0.6:
@@ -129,7 +129,7 @@ def random_pair(points, seed):
 
 
 def row(what, draw, handles):
-    """`draw` (count, seed) takes samples of the shape."""
+    """`draw(count, seed)` returns samples of the shape."""
     samples, fresh = draw(20_000, 0), draw(FRESH, FRESH_SEED)
     field = af.deform(samples, handles, af.DeformOptions(exact_handles=True))
     bending = testing.bending(fresh, af.DeformOptions())

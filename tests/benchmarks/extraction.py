@@ -31,7 +31,7 @@ def dense(network, resolution):
 
 
 def run(rounds=1):
-    """A row a network: seconds of both, ratio, our share of the evaluations, largest vertex distance."""
+    """A row per network: seconds of both, their ratio, share of evaluations, largest vertex distance."""
     torch.set_num_threads(THREADS)
     rows = []
     for name, resolution in CASES:

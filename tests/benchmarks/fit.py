@@ -12,7 +12,7 @@ import arapfields as af
 from . import shapes
 
 TARGET, BATCH, SEED = 0.002, 1024, 0
-STEPS_TO_TARGET = 135  # of ours, with its schedule; the error it reaches is in the row
+STEPS_TO_TARGET = 135  # iterations of fit_sdf, with its schedule; the row contains the error
 
 
 def points_near(mesh, count, seed):
@@ -22,7 +22,7 @@ def points_near(mesh, count, seed):
 
 
 def plain_adam(mesh, held_out, expected, limit=6000):
-    """Seconds (distances included) and steps until the target, and the error there; constant rate 1e-3."""
+    """Seconds (including distances) and steps to the target, and the error then; constant rate 1e-3."""
     torch.manual_seed(SEED)
     begin = time.perf_counter()
     points = np.concatenate(

@@ -14,7 +14,7 @@ WIDTH, LAYERS, ENCODED, OUTPUTS = 256, 4, 24, 3
 
 
 def bare_products(points, columns):
-    """The products that any such implementation needs, with every column, as torch.mm does them."""
+    """The necessary matrix products with all columns, by torch.mm."""
     rows = points * columns
     sizes = [(ENCODED, WIDTH), *[(WIDTH, WIDTH)] * (LAYERS - 1), (WIDTH, OUTPUTS)]
     below = {size: torch.randn(rows, size) for size in (ENCODED, WIDTH)}
@@ -33,7 +33,7 @@ def bare_products(points, columns):
 
 
 def peak_memory(points):
-    """MiB that one evaluation adds to the process."""
+    """Additional memory of one evaluation, in MiB."""
     code = (
         "from pathlib import Path\nfrom arapfields._native import testing\n"
         "def peak(): return int(Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0]) / 1024\n"

@@ -11,7 +11,7 @@ NEURAL_ITERATIONS = 500
 
 
 def drag(live, name, degrees=range(0, FULL + 1, 2)):
-    """Wall and processor seconds of a solve while the handle goes there and back in such steps."""
+    """Wall and processor seconds per solve while the handle moves there and back in these steps."""
     live.reset()
     poses = [targets(name, d) for d in [*degrees, *reversed(degrees)]]
     with Clock() as clock:
@@ -63,7 +63,7 @@ def neural_field(name):
 
 
 def polish_row(name, neural, iterations=NEURAL_ITERATIONS // 3):
-    """A network that starts from the radial field, against one that starts from rest."""
+    """A network initialized by the radial field, against one from rest."""
     with Clock() as clock:
         options = af.DeformOptions(field="neural", start="radial", iterations=iterations)
         field = af.deform(samples(name), handles(name, FULL), options)
@@ -76,7 +76,7 @@ def polish_row(name, neural, iterations=NEURAL_ITERATIONS // 3):
     }
 
 
-STYLES = {  # aim for the mean of g: what suffices for it
+STYLES = {  # {wanted mean of g: options for it}
     0.90: {"fine_centers": 400, "coarse_centers": 80, "gauss_weight": 4.0},
     0.95: {"fine_centers": 700, "coarse_centers": 140, "gauss_weight": 6.0, "samples": 3000},
     0.97: {"fine_centers": 1000, "coarse_centers": 200, "gauss_weight": 8.0, "samples": 4000},
@@ -84,7 +84,7 @@ STYLES = {  # aim for the mean of g: what suffices for it
 
 
 def style_row(aim, options, most=60):
-    """Time from samples to spot in the cube style at this mean preference, set-up included."""
+    """Time from the samples to spot in the cube style at this mean preference, including setup."""
     surface = samples("spot")
     with Clock() as clock:
         live = af.LiveDeformer(surface, options=af.LiveOptions(bending=0.01, barrier=1.0, **options))
@@ -107,7 +107,7 @@ def style_row(aim, options, most=60):
 
 
 def slider_row(updates=30):
-    """A style's strength, sharpness or orientation moved in small steps, 600 centers."""
+    """Small changes of a style's strength, sharpness or orientation, with 600 centers."""
     live = af.LiveDeformer(
         samples("spot"),
         options=af.LiveOptions(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the live benchmarks share: a solver for a shape's drag, a clock, and what is inside a box."""
+"""Helpers of the live benchmarks: a solver for a drag, a clock, vertices inside a box."""
 
 import time
 
@@ -23,7 +23,7 @@ def deformer(name, **options):
 
 
 class Clock:
-    """Wall and processor seconds of a block: the second is the same on a busy machine."""
+    """Context manager: wall and processor seconds of a block; the latter do not depend on other load."""
 
     def __enter__(self):
         self.begin = time.perf_counter(), time.process_time()

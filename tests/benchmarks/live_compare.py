@@ -25,7 +25,7 @@ from .peer.yardstick import rotations
 
 
 def igl_arap(vertices, triangles, boxes, poses, tolerance=1e-4, most=2000):
-    """libigl's ARAP from rest until an iteration is less than this share of the whole motion."""
+    """libigl's ARAP from rest until an iteration moves by less than this share of the whole motion."""
     import igl
 
     members = [np.flatnonzero(inside(rest, vertices)) for rest in boxes]

@@ -13,7 +13,7 @@ CLAY, MOVED = np.array([0.80, 0.76, 0.70]), np.array([0.45, 0.62, 0.80])
 
 
 def draw(axes, vertices, triangles, toward, title, colour=MOVED):
-    """Flat-shaded triangles seen from direction `toward`, z up, the far ones first."""
+    """Draws flat-shaded triangles from direction `toward`, z up, from back to front."""
     toward = np.asarray(toward, float) / np.linalg.norm(toward)
     right = np.cross([0, 0, 1], toward)
     right /= np.linalg.norm(right)

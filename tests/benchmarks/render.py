@@ -18,7 +18,7 @@ PAGE = ROOT / "docs" / "performance.md"
 PLOT = ROOT / "docs" / "images" / "performance.svg"
 PEERS = ROOT / "docs" / "peers.md"
 BEGIN, END = "<!-- bench: begin -->", "<!-- bench: end -->"
-SECTIONS = {  # titles; a module's first sentence stands below
+SECTIONS = {  # {module: title}; the module's first sentence is the subtitle
     "defaults": "From the press to the result",
     "exact": "Exact handles",
     "deform": "Deformation",
@@ -69,13 +69,13 @@ HEADINGS = {
     "within_10_percent": "area within 10°, %",
     "others_percent": "other fingertips, % of the length",
 }
-# Said by another column, a check of the run, or of the machine.
+# Columns that repeat another one, check the run, or describe the machine.
 HIDDEN = {"ratio", "unit", "same_side", "same_number", "products_GFLOPs", "at_175_s", "energy_12_steps"}
-PLOTTED = {"jets"}  # whose rows are bars of the plot alone
+PLOTTED = {"jets"}  # sections that appear only in the plot
 
 
 def groups(rows):
-    """Runs of rows whose columns are alike: the keys of one hold those of the other."""
+    """Consecutive rows with similar columns: the keys of one include those of the other."""
     found = []
     for row in rows:
         if found and (row.keys() <= found[-1][0].keys() or row.keys() >= found[-1][0].keys()):
@@ -86,15 +86,15 @@ def groups(rows):
 
 
 def shown(name, columns):
-    """Whether a column is drawn: processor seconds are not beside the same figure by the clock."""
+    """Whether a column is shown: processor time is not shown beside the same wall time."""
     if name in ("ours_s", "theirs_s") and "competitor" in columns:
-        return False  # the same as points a second
+        return False  # the same as points per second
     twin = {"per_cpu_s": "solves_per_s"}.get(name, name.replace("_per_cpu_s", "").replace("_cpu", ""))
     return name not in HIDDEN and (twin == name or twin not in columns)
 
 
 def table(rows):
-    """A Markdown table with the columns that its rows have, in the order of their first use."""
+    """A Markdown table with the columns of its rows, in the order of their first use."""
     columns = list(dict.fromkeys(key for row in rows for key in row))
     columns = [name for name in columns if shown(name, columns)]
     header = [HEADINGS.get(name, name.replace("_", " ")) for name in columns]
@@ -104,7 +104,7 @@ def table(rows):
 
 
 def drawn(header, lines, cells):
-    """A Markdown table of cells; what the first column repeats stands once, in its heading or first row."""
+    """A Markdown table of cells; text that the first column repeats appears once, as heading or in a row."""
     first = [row[0] for row in cells]
     parts = [first[0][: part.end()] for part in re.finditer(": |, ", first[0])] if len(set(first)) > 1 else []
     shared = max((part for part in parts if all(one.startswith(part) for one in first)), key=len, default="")
@@ -129,14 +129,14 @@ def text(value):
 
 
 def title(module):
-    """The first sentence of the benchmark module's docstring, less the section's title."""
+    """The first sentence of the benchmark module's docstring, without the section's title."""
     source = (Path(__file__).parent / f"{module}.py").read_text()
     sentence = " ".join(ast.get_docstring(ast.parse(source)).split("\n\n")[0].split()).rstrip(".")
     sentence = sentence.removeprefix(f"{SECTIONS.get(module)}: ")
     return sentence[0].upper() + sentence[1:]
 
 
-LABELS = {  # of the plot; elsewhere a row's own words
+LABELS = {  # labels of the plot, by default the row's text
     "jets": "sweep of {points:,} points, {columns} columns, to bare products",
     "sampling": "20,000 samples of the {case}",
     "distance": "{name}",
@@ -146,7 +146,7 @@ LABELS = {  # of the plot; elsewhere a row's own words
 
 
 def bars(results):
-    """(label, ratio) of every row that was paired with a competitor."""
+    """[(label, ratio)] of the rows with a competitor."""
     found = []
     for module, rows in results.items():
         for row in rows:
@@ -156,7 +156,7 @@ def bars(results):
 
 
 def plot(found, left=400, width=860, step=24):
-    """A bar a row on a logarithmic scale: to the right of the line, ours is faster."""
+    """An SVG with a bar per row on a logarithmic scale; to the right of the line, this library is faster."""
     most = max(2.0, *(ratio for _, ratio in found)) * 1.25
     least = min(0.5, *(ratio for _, ratio in found)) / 1.1
 
@@ -206,7 +206,7 @@ def page(results, machine):
 
 
 def peers_row(row):
-    """A row as it is shown: the settings beside the method."""
+    """The shown cells of a row, with the settings beside the method."""
     said = {"by": f"{row['by']} ({row['said']})"} if row.get("said") else {}
     return {key: value for key, value in (row | said).items() if key not in ("what", "vertices", "said")}
 

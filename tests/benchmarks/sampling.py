@@ -21,7 +21,7 @@ THREADS = 2
 
 
 class Counted:
-    """The network in single precision, as the published ones' authors evaluate them; counts points."""
+    """The network in single precision, as published; counts evaluated points."""
 
     def __init__(self, layers):
         weights, biases, self.octaves, self.frequency, self.sharpness = layers
@@ -53,7 +53,7 @@ def uniformity(sdf, points):
 
 
 def run(rounds=3):
-    """A row a network: milliseconds and evaluations a point of both, and how much faster ours is."""
+    """A row per network: milliseconds and evaluations per point of both, and their ratio."""
     torch.set_num_threads(THREADS)
     rows = []
     for name in NAMES:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shapes of the benchmarks: published networks where ARAPFIELDS_DATA has them, else shapes of our own.
+"""The shapes of the benchmarks: published networks in ARAPFIELDS_DATA, else stand-ins.
 
-Figures of the two are not comparable, so rows of our own shapes bear their names.
+Their figures are not comparable, so rows of stand-ins have their names.
 """
 
 import functools
@@ -21,7 +21,7 @@ from support.oracles.network import Network  # noqa: E402
 OURS = {"bunny": "dinosaur", "spot": "dog", "hand": "hand", "whale": "lizard", "cube": "mug"}
 CREATURES = ("dinosaur", "lizard", "octopus")
 FULL = 70  # degrees of a whole drag
-HALF_EXTENT = 0.75  # of our own shapes, as fit_sdf has it: the networks' frame is then the identity
+HALF_EXTENT = 0.75  # of stand-ins, as in fit_sdf, so that the networks' frame is the identity
 
 
 def data():
@@ -37,13 +37,13 @@ def is_published(name):
 
 
 def label(name):
-    """What a row calls the shape."""
+    """The shape's name in rows."""
     return name if is_published(name) else f"our {OURS[name]}"
 
 
 @functools.cache
 def own_mesh(name):
-    """Vertices and triangles of a creature or a stand-in, centred, its largest half-extent HALF_EXTENT."""
+    """Vertices and triangles of a creature or a stand-in, centered, with largest half extent HALF_EXTENT."""
     import menagerie
 
     shape = menagerie.load(OURS.get(name, name))
@@ -57,7 +57,7 @@ def layers(name):
     """Weights, biases, octaves, frequency, sharpness of the shape's network, of four layers of 256."""
     if is_published(name):
         return Network.published(network_file(name)).layers
-    file = ROOT / "build" / "bench" / f"{OURS[name]}.npz"  # a fit takes longer than most of what is measured
+    file = ROOT / "build" / "bench" / f"{OURS[name]}.npz"  # cached: a fit takes longer than most benchmarks
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
         af.fit_sdf(*own_mesh(name), af.FitOptions(seed=0)).save(file)
@@ -71,12 +71,12 @@ def sdf(name):
 
 @functools.cache
 def samples(name, count=20000):
-    """Uniform samples of the network's zero set; frame identity."""
+    """Uniform samples of the network's zero set, with frame identity."""
     return af.sample_surface(sdf(name), count=count, seed=0)
 
 
 def mesh(name):
-    """The published mesh of that name, or the stand-in's, of half-extent HALF_EXTENT."""
+    """The published mesh of that name, or the stand-in's, with half extent HALF_EXTENT."""
     file = data() / "meshes" / f"{name}.obj"
     if not file.is_file():
         return own_mesh(name)
@@ -85,7 +85,7 @@ def mesh(name):
     return (vertices - centre) / (np.ptp(vertices, 0).max() / (2 * HALF_EXTENT)), triangles
 
 
-# Box held, box moved, axis and pivot of its turn, in the network's cube.
+# Fixed box, moved box, axis and pivot of its rotation, in the network's cube.
 PUBLISHED_DRAGS = {
     "bunny": ([[-1, -1, -1], [1, 1, -0.35]], [[-1, -1, 0.6], [1, 1, 1]], [0, 1, 0], (-0.1, 0, 0.3)),
     "spot": ([[-1, -1, -1], [1, 1, -0.35]], [[-1, 0.2, 0.25], [1, 1, 1]], [0, 0, 1], (0, 0.3, 0)),
@@ -112,7 +112,7 @@ def drag(name):
     return (PUBLISHED_DRAGS if is_published(name) else OUR_DRAGS)[name]
 
 
-# Where the hand's fingertips are; of those that move the box and the pivot; axes of a turn aside and forward.
+# The hand's fingertips; box and pivot of moved ones; axes of rotations sideways and forward.
 PUBLISHED_HAND = {
     "tips": {
         "thumb": (0.33, -0.38, 0.1),
@@ -146,12 +146,12 @@ def hand():
 
 
 def placements(name):
-    """(4, 4) of the held box and of the moved one, at rest."""
+    """(4, 4) boxes at rest: the fixed and the moved one."""
     return [cases.box(*corners) for corners in drag(name)[:2]]
 
 
 def targets(name, degrees):
-    """What live.solve takes: the held box, and the moved one after a turn by so many degrees."""
+    """Targets for live.solve: the fixed box, and the moved one rotated by `degrees`."""
     held, moved = placements(name)
     return [held, cases.turn(drag(name)[2], degrees, drag(name)[3]) @ moved]
 

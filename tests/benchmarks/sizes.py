@@ -32,7 +32,7 @@ print(json.dumps(dict(seconds=round(seconds, 3), peak_MiB=round(peak() - before)
 
 
 def measured(prepare, work):
-    """The figures of one run, or the error that it ended with."""
+    """The figures of one run, or its error."""
     code = SETTING.format(root=str(shapes.ROOT), prepare=prepare, work=work)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     if done.returncode:
@@ -41,7 +41,7 @@ def measured(prepare, work):
 
 
 def run():
-    shapes.layers("bunny")  # if it has to be fitted, then now
+    shapes.layers("bunny")  # fits the stand-in now if necessary
     bunny = "shapes.samples('bunny', 30000)"
     options = "af.DeformOptions(field='neural', iterations=5, {})"
     solve = f"af.deform(samples, shapes.handles('bunny', shapes.FULL), {options})"

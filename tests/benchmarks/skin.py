@@ -16,7 +16,7 @@ COUNTS = (25, 200)
 
 
 def rig(joints, count):
-    """The joints' bones, divided evenly until there are so many."""
+    """The joints' bones, subdivided evenly to `count`."""
     bones, last = [], {}
     for number, (name, (parent, head, tail)) in enumerate(joints.items()):
         pieces = count // len(joints) + (number < count % len(joints))
@@ -46,7 +46,7 @@ print(json.dumps({
 
 
 def run():
-    """A row a number of bones, each of a process of its own."""
+    """A row per number of bones, each measured in a separate process."""
     import child
 
     body, rows = child.body(cells=CELLS), []

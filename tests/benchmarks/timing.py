@@ -12,7 +12,7 @@ def once(call):
 
 
 def paired(ours, theirs, rounds=5, warm_up=True):
-    """Runs both calls alternately; the row fields: median seconds of each and the median of the ratios."""
+    """Runs both calls alternately; returns row fields: median seconds of each and median ratio."""
     if warm_up:
         ours(), theirs()
     pairs = [(once(ours), once(theirs)) for _ in range(rounds)]
@@ -24,8 +24,7 @@ def paired(ours, theirs, rounds=5, warm_up=True):
 
 
 def first_good(solve, good, counts):
-    """The fewest of `counts` iterations with which solve(count) is good (None where none is), the seconds of
-    that run, and its report."""
+    """The smallest of `counts` for which solve(count) is good, or None; its seconds and report."""
     for count in counts:
         begin = time.perf_counter()
         field = solve(count)
@@ -36,7 +35,7 @@ def first_good(solve, good, counts):
 
 
 def product_rate(size=256, rows=10_000, rounds=9):
-    """GFLOP/s of bare single-precision matrix products of a network's size, now."""
+    """Present GFLOP/s of single-precision matrix products of a network's size."""
     import torch
 
     a, b, c = torch.randn(rows, size), torch.randn(size, size), torch.empty(rows, size)
