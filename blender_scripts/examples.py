@@ -83,8 +83,7 @@ def skin():
     child.split(body)
     for place, side in zip(child.EYES, "RL", strict=True):
         child.eye(place, side)
-    rig = dressing.rig(child.JOINTS)
-    rig.show_in_front = True
+    dressing.rig(child.JOINTS)
     in_studio([body], azimuth=18, elevation=6, around=[(-0.95, 0, 1.9), (0.95, 0, 1.9)])
     chosen(body)
 
@@ -187,7 +186,9 @@ SCENES = (pins, character, skin, animate, walk, stylize, wrap, transfer, contact
 
 
 def comfortable():
-    """Sets viewports to show colours, the camera's view and the sidebar."""
+    """Sets viewports to show colours, the camera's view, the sidebar, and bones in front of the mesh."""
+    for item in list(bpy.data.objects):
+        item.show_in_front |= item.type == "ARMATURE"
     for screen in list(bpy.data.screens):
         for area in screen.areas:
             for space in area.spaces:

@@ -42,6 +42,13 @@ def seen(name):
     return [np.array([vertex.co for vertex in data.vertices]) for data in (item.data, mesh)]
 
 
+def bones_are_in_reach():
+    """Whether a click meets the bones, which lie within the mesh."""
+    import bpy
+
+    return all(item.show_in_front for item in bpy.data.objects if item.type == "ARMATURE")
+
+
 def pins():
     rest, now = seen("Dinosaur")
     off, size = np.linalg.norm(now - rest, axis=1), np.ptp(rest[:, 2])
@@ -51,6 +58,7 @@ def pins():
 
 
 def character():
+    assert bones_are_in_reach()
     rest, now = seen("Body")
     hand = rest[:, 0] > 0.75
     assert (now - rest)[hand, 2].mean() > 0.2
@@ -61,6 +69,7 @@ def character():
 
 def skin():
     """Nobody's triangles part, and eyes stay as they are."""
+    assert bones_are_in_reach()
     rest, now = seen("Body")
     _, first, same = np.unique(rest.round(5), axis=0, return_index=True, return_inverse=True)
     assert np.abs(now - now[first[same.ravel()]]).max() < 1e-3 and np.abs(now - rest).max() > 0.3
@@ -115,6 +124,7 @@ def transfer():
     """The grown-up has all of the child but its place, and raises its arm and its nose."""
     import bpy
 
+    assert bones_are_in_reach()
     child, grown = bpy.data.objects["Child"], bpy.data.objects["Grown-up"]
     rest, now = seen("Grown-up")
     off, size = np.linalg.norm(now - rest, axis=1), np.ptp(rest[:, 2])
