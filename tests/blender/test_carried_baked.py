@@ -9,7 +9,6 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.live import step
-    from support.blender.stacks import reading_nodes
 
     from addon.field_modifier import inputs
 
@@ -22,7 +21,7 @@ def test_modifiers_behind_the_field_act_on_the_baked_object_too():
     laid = sleeve.modifiers.new("Laid", "SHRINKWRAP")
     laid.target, laid.wrap_mode, laid.offset = bar, "OUTSIDE", 0.05
     sleeve.modifiers.new("Finer", "SUBSURF")
-    inputs.put(reading_nodes(sleeve, bar), "Share", 0.25)
+    inputs.put(scenes.reading_nodes(sleeve, bar), "Share", 0.25)
     scenes.activate(sleeve, bar)
     bpy.ops.arapfields.carry()
     for frame, height in ((1, 0.0), (3, 0.4)):

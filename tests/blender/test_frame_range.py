@@ -7,7 +7,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.stacks import armature, reading_nodes
+    from support.blender.stacks import armature
 
     from addon.solver.frame_range import animation_range
 
@@ -69,7 +69,7 @@ def by_a_path(bar, moving):
 
 
 def by_an_object_of_nodes(bar, _):
-    reading_nodes(bar, keyed(empty()))
+    scenes.reading_nodes(bar, keyed(empty()))
 
 
 def by_an_obstacle(bar, _):

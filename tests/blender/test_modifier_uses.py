@@ -14,7 +14,7 @@ if IN_BLENDER:
     from mathutils import Matrix
     from support.blender import scenes
     from support.blender.scenes import FIT
-    from support.blender.stacks import build, local_points, reading_nodes
+    from support.blender.stacks import build, local_points
 
     from addon.blender import modifier_stack
     from addon.blender.object_references import source_of
@@ -156,7 +156,7 @@ def test_the_shape_is_read_at_the_scenes_own_time():
 def test_reading_the_shape_leaves_no_users_behind():
     bar, *_ = scenes.bar_with_handles()
     named = bpy.data.objects.new("Named", None)
-    modifier = reading_nodes(bar, named)
+    modifier = scenes.reading_nodes(bar, named)
     before = named.users
     with modifier_stack.mesh_of(bpy.context, bar, []) as mesh:
         assert len(mesh.vertices) == len(bar.data.vertices)

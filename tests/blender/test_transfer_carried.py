@@ -8,7 +8,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from mathutils import Vector
-    from support.blender import scenes, stacks, wraps
+    from support.blender import scenes, wraps
     from support.blender.character import link
     from support.blender.stages import all_said
 
@@ -97,7 +97,7 @@ def test_nodes_drivers_and_bones_of_copies_read_what_the_target_has():
     rig.pose.bones["Upper"].constraints.new("DAMPED_TRACK").target = item
     eye = ball("Eye", (0.6, -0.3, 0.1))
     eye.shape_key_add(name="Basis")
-    stacks.reading_nodes(eye, item)
+    scenes.reading_nodes(eye, item)
     for owner, path, block, value in (
         (eye.shape_key_add(name="Up"), "value", item.data.shape_keys, 'key_blocks["Fat"].value'),
         (rig, "empty_display_size", rig.data, '["leg"]'),

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Script for any Blender, without the native library: the modifier and its inputs, with given offsets.
+"""Script for any Blender, without the native library: the modifier and its inputs, with given offsets, and
+copies of modifiers.
 
 blender -b --factory-startup --python tests/support/blender/modifier_alone.py
 or with PyPI's bpy: python tests/support/blender/modifier_alone.py
 """
 
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -17,7 +19,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from support.blender import scenes  # noqa: E402
 
-from addon.blender import modifier_stack  # noqa: E402
+import addon  # noqa: E402
+from addon.blender import modifier_stack, references  # noqa: E402
 from addon.field_modifier import inputs, motion  # noqa: E402
 
 EXACT = 1e-6  # single precision of positions of size one
@@ -50,7 +53,7 @@ def check_inputs():
     assert masked[100:].tobytes() == rest[100:].tobytes()
     assert np.abs(masked[:100] - (rest + given / 2)[:100]).max() < EXACT
     if bpy.app.version >= (4, 5, 0):
-        motion.choose_group(modifier, "POINT")
+        motion.choose_group(modifier, "POINT", {})
     assert inputs.get(modifier, "Factor") == 0.5 and inputs.get_attribute(modifier, "Mask") == "Some"
     inputs.put_attribute(modifier, "Mask", "")
     assert np.abs(points(bar) - (rest + given / 2)).max() < EXACT
@@ -100,10 +103,27 @@ def check_free_normals():
     assert np.abs(flat.reshape(-1, 3) - expected).max() < EXACT
 
 
+def check_copies():
+    read, twin, other, made = (scenes.bar(name) for name in ("Read", "Twin", "Other", "Made"))
+    other.modifiers.new("Laid", "SHRINKWRAP").target = read
+    nodes = scenes.reading_nodes(other, read)
+    inputs.put(nodes, "Share", 0.25)
+    inputs.put_attribute(nodes, "Share", "Some")
+    references.copy_modifiers(made, other.modifiers)
+    references.remap(references.parts_of(made), {read: twin})
+    copied = made.modifiers["Nodes"]
+    assert made.modifiers["Laid"].target == inputs.get(copied, "Goal") == twin
+    assert other.modifiers["Laid"].target == inputs.get(nodes, "Goal") == read
+    assert inputs.get(copied, "Share") == 0.25 and inputs.get_attribute(copied, "Share") == "Some"
+
+
 bpy.ops.wm.read_factory_settings(use_empty=True)
+addon.register()
 check_inputs()
+check_copies()
 check_helper()
 if bpy.app.version >= (4, 5, 0):
     check_free_normals()
 assert len(bpy.data.scenes) == 1 and modifier_stack.find(bpy.data.objects["Mirrored"]) is not None
-print("modifier works in", bpy.app.version_string)
+print("modifier works in", bpy.app.version_string, flush=True)
+os._exit(0)  # bpy 4.2 crashes at its end: see installed.py

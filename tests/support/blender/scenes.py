@@ -7,6 +7,8 @@ import bmesh
 import bpy
 import numpy as np
 
+from addon.field_modifier import inputs
+
 QUICK = {"iterations": 40, "samples": 1000, "batch": 100, "width": 32, "layers": 2}
 
 NEW = QUICK | {"result": "NEW"}
@@ -177,6 +179,21 @@ def delete(item):
         home.objects.unlink(item)
     bpy.context.view_layer.update()
     assert item.name in bpy.data.objects
+
+
+def reading_nodes(item, read):
+    """Adds a Geometry Nodes modifier without effect that has the object `read` as an input."""
+    group = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    group.interface.new_socket("Goal", in_out="INPUT", socket_type="NodeSocketObject")
+    group.interface.new_socket("Share", in_out="INPUT", socket_type="NodeSocketFloat")
+    ends = [group.nodes.new(f"NodeGroup{end}") for end in ("Input", "Output")]
+    group.links.new(ends[0].outputs[0], ends[1].inputs[0])
+    modifier = item.modifiers.new("Nodes", "NODES")
+    modifier.node_group = group
+    inputs.put(modifier, "Goal", read)
+    return modifier
 
 
 def edit_bones(rig, change):

@@ -7,7 +7,6 @@ from support.blender import scenes
 
 import arapfields
 from addon.core.geometry.spaces import space_of
-from addon.field_modifier import inputs
 
 
 def armature():
@@ -50,21 +49,6 @@ def add_modifier(bar, kind):
     elif kind == "MIRROR":
         modifier.use_axis, modifier.use_mirror_merge = (False, False, True), False
     bpy.context.view_layer.update()
-
-
-def reading_nodes(item, read):
-    """Adds a Geometry Nodes modifier without effect that has the object `read` as an input."""
-    group = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
-    for way in ("INPUT", "OUTPUT"):
-        group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    group.interface.new_socket("Goal", in_out="INPUT", socket_type="NodeSocketObject")
-    group.interface.new_socket("Share", in_out="INPUT", socket_type="NodeSocketFloat")
-    ends = [group.nodes.new(f"NodeGroup{end}") for end in ("Input", "Output")]
-    group.links.new(ends[0].outputs[0], ends[1].inputs[0])
-    modifier = item.modifiers.new("Nodes", "NODES")
-    modifier.node_group = group
-    inputs.put(modifier, "Goal", read)
-    return modifier
 
 
 def build(stack):
