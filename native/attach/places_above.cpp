@@ -37,11 +37,11 @@ PlacesAbove::PlacesAbove(const SurfaceSamples& samples, PointsIn points, const V
   points_ = points;
   const Vector disks = (disk * distances).cwiseMax(least_disk * spacing).cwiseMin(most_disk * spacing);
   reach_ = (distances.cwiseAbs2() + disks.cwiseAbs2()).cwiseSqrt();
-  const Vector away = nearest_distances(points_, samples.points);
+  const Vector to_samples = nearest_distances(points_, samples.points);
   const double farthest = reach_.maxCoeff();
   std::vector<Index> about;
   for (Index i = 0; i < samples.size(); ++i)
-    if (away[i] <= farthest) about.push_back(i);
+    if (to_samples[i] <= farthest) about.push_back(i);
   samples_ = samples.points(about, Eigen::all);
   normals_ = samples.normals(about, Eigen::all);
 }
@@ -78,11 +78,11 @@ void PlacesAbove::adjust(const DeformationField& field, Points& moved) const {
       double total = 0.0, grown = 0.0;
       Vec3 mean = Vec3::Zero();
       for (const Index j : tree.within(point, reach_[i])) {
-        const Vec3 away = point - samples_.row(j).transpose();
-        const double distance = std::max(away.norm(), least_distance * spacing_);
+        const Vec3 offset = point - samples_.row(j).transpose();
+        const double distance = std::max(offset.norm(), least_distance * spacing_);
         const double kernel = std::max(1.0 / (distance * distance) - outside, 0.0);
         weights.push_back(kernel * std::sqrt(kernel));
-        answers.push_back(Eigen::Map<const Vec3>(view.at(0, j)) + slopes[j] * away);
+        answers.push_back(Eigen::Map<const Vec3>(view.at(0, j)) + slopes[j] * offset);
         total += weights.back();
         grown += weights.back() * growth[j];
         mean += weights.back() * answers.back();

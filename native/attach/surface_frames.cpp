@@ -39,10 +39,10 @@ class Weights {
     double total = 0.0, least = std::numeric_limits<double>::infinity();
     Index nearest = 0;
     for (Index i = 0; i < points.rows(); ++i) {
-      const double away = (points.row(i).transpose() - point).squaredNorm();
-      if (away < least) least = away, nearest = i;
-      const double kernel = 1.0 / std::max(away, tiny_square) - outside;
-      const double area = kernel > 0.0 ? area_of(i, std::sqrt(away)) : 0.0;
+      const double square = (points.row(i).transpose() - point).squaredNorm();
+      if (square < least) least = square, nearest = i;
+      const double kernel = 1.0 / std::max(square, tiny_square) - outside;
+      const double area = kernel > 0.0 ? area_of(i, std::sqrt(square)) : 0.0;
       if (area > 0.0) entries.push_back({i, area * kernel * std::sqrt(kernel)});
       if (area > 0.0) total += entries.back().weight;
     }
@@ -94,8 +94,8 @@ SurfaceFrames::SurfaceFrames(PointsIn samples) {
       Index closest = 0, level = static_cast<Index>(levels.size()) - 1;
       for (Index j = 0; j < points_.rows(); ++j) {
         for (; j == levels[level]; --level) nearest[level][i] = closest;
-        const double away = (points_.row(j) - samples.row(i)).squaredNorm();
-        if (away < least) least = away, closest = j;
+        const double square = (points_.row(j) - samples.row(i)).squaredNorm();
+        if (square < least) least = square, closest = j;
       }
       for (; level >= 0; --level) nearest[level][i] = closest;
     }

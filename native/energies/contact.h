@@ -24,12 +24,12 @@ struct ContactPlane {
   /// Tangential displacement from the anchor.
   template <class Scalar>
   Vec3 slip(const Scalar* places) const {
-    const Vec3 way =
+    const Vec3 motion =
         Eigen::Map<const Eigen::Vector3<Scalar>>(places + 3 * first).template cast<double>() - anchor;
-    return along(way);
+    return along(motion);
   }
   /// The tangential component of a vector.
-  Vec3 along(const Vec3& way) const { return way - normal.dot(way) * normal; }
+  Vec3 along(const Vec3& vector) const { return vector - normal.dot(vector) * normal; }
 
   /// The gap at places (n,3), negative where the constraint is violated.
   template <class Scalar>

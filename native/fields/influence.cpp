@@ -78,10 +78,10 @@ void Influence::for_each_point(PointsIn points, JetOrder order, Consume&& consum
           const ScalarJet arm = linear(Vec3::Unit(a), -places_(k, a), x);
           square += arm * arm;
           if (!embedding_) continue;
-          ScalarJet way;
-          for (int c = 0; c < columns(order); ++c) way.c[c] = inside.view().at(c, i)[a];
-          way.c[0] -= embedded_(k, a);
-          square += way * way;
+          ScalarJet difference;
+          for (int c = 0; c < columns(order); ++c) difference.c[c] = inside.view().at(c, i)[a];
+          difference.c[0] -= embedded_(k, a);
+          square += difference * difference;
         }
         for (double& entry : square.c) entry *= scale;
         if (square.c[0] < 1.0) rest = rest * one_minus(fall_off_of_square(square));

@@ -30,10 +30,11 @@ LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::ve
       extended ? Frame::balanced(samples, Vector::Ones(samples.rows()), {}, 1.0).scale : 1.0;
   most_ = median_ = most_share * gyration;
   if (!extended || normals.rows() != samples.rows()) return;
-  const std::vector<Index> chosen = evenly(order, most_nodes), seen = evenly(order, most_witnesses);
+  const std::vector<Index> chosen = evenly(order, most_nodes), witness_rows = evenly(order, most_witnesses);
   nodes_ = samples(chosen, Eigen::all);
   const Points node_normals = normals(chosen, Eigen::all);
-  const Points witnesses = samples(seen, Eigen::all), witness_normals = normals(seen, Eigen::all);
+  const Points witnesses = samples(witness_rows, Eigen::all),
+               witness_normals = normals(witness_rows, Eigen::all);
   // The square root of a sphere's area of this radius of gyration: spacings need only its order of magnitude.
   const double side = 3.5 * gyration;
   spacing_ = side / std::sqrt(static_cast<double>(nodes_.rows()));

@@ -38,10 +38,10 @@ std::vector<Index> missed_rows(PointsIn points, const std::vector<Index>& chosen
   std::vector<Index> missed;
   const auto left = points.rows() - static_cast<Index>(chosen.size());
   if (left <= 0 || chosen.empty()) return missed;
-  const Vector away = nearest_distances(rows_of(points, chosen), points);
-  const double widest = widest_gap * away.sum() / static_cast<double>(left);
-  for (Index i = 0; i < away.size(); ++i)
-    if (away[i] > widest) missed.push_back(i);
+  const Vector distances = nearest_distances(rows_of(points, chosen), points);
+  const double widest = widest_gap * distances.sum() / static_cast<double>(left);
+  for (Index i = 0; i < distances.size(); ++i)
+    if (distances[i] > widest) missed.push_back(i);
   return missed;
 }
 

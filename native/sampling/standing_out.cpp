@@ -25,21 +25,21 @@ constexpr int most_steps = 40;
 std::pair<Vec3, double> out_of_hull(const Points& arms, double enough) {
   Index next = 0;
   arms.rowwise().squaredNorm().minCoeff(&next);
-  Vec3 nearest = arms.row(next).transpose(), way = Vec3::Zero();
+  Vec3 nearest = arms.row(next).transpose(), direction = Vec3::Zero();
   double height = 0.0;
   for (int step = 0; step < most_steps && nearest.norm() > enough; ++step) {
     const Vec3 along = nearest.normalized();
     const double beyond = (arms * along).minCoeff(&next);
     if (beyond > height) {
       height = beyond;
-      way = along;
+      direction = along;
     }
     const Vec3 change = arms.row(next).transpose() - nearest;
     const double share = -change.dot(nearest) / std::max(change.squaredNorm(), 1e-300);
     if (share <= 0.0) break;
     nearest += std::min(1.0, share) * change;
   }
-  return {way, height};
+  return {direction, height};
 }
 
 }  // namespace
@@ -48,7 +48,7 @@ std::vector<Index> standing_out(PointsIn points, PointsIn samples, PointsIn norm
                                 double least, Index most, const Progress& progress) {
   const CancelScope scope(progress);
   const OrientedPoints tree(samples, Points::Zero(samples.rows(), 3));
-  Points ways(points.rows(), 3);  // directions out of the hulls
+  Points directions(points.rows(), 3);  // directions out of the hulls
   Vector heights = Vector::Zero(points.rows()), reaches(points.rows());
   parallel_for(0, points.rows(), grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
@@ -67,9 +67,9 @@ std::vector<Index> standing_out(PointsIn points, PointsIn samples, PointsIn norm
         arms.row(k) = place.transpose() - samples.row(sample);
         normal += normals.row(sample).transpose() / static_cast<double>(arms.rows());
       }
-      const auto [way, height] = out_of_hull(arms, least);
-      ways.row(i) = way.transpose();
-      if (way.dot(normal) >= inwards) heights[i] = height;
+      const auto [direction, height] = out_of_hull(arms, least);
+      directions.row(i) = direction.transpose();
+      if (direction.dot(normal) >= inwards) heights[i] = height;
     }
   });
   std::vector<Index> order, chosen;
@@ -81,7 +81,7 @@ std::vector<Index> standing_out(PointsIn points, PointsIn samples, PointsIn norm
     progress.check();
     const bool covered = std::any_of(chosen.begin(), chosen.end(), [&](Index k) {
       const Vec3 arm = (points.row(i) - points.row(k)).transpose();
-      return ways.row(i).dot(arm) <= least && arm.squaredNorm() < reaches[i] * reaches[i];
+      return directions.row(i).dot(arm) <= least && arm.squaredNorm() < reaches[i] * reaches[i];
     });
     if (!covered) chosen.push_back(i);
   }

@@ -91,13 +91,13 @@ CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::
     progress.report(0.1 + 0.9 * static_cast<double>(p) / static_cast<double>(poses), "Posing");
     const ExamplePose pose = examples.draw(random, always, progress);
     for (Index b = 0; b < joints; ++b) {
-      const JointFeatures seen = joint_features_of(pose.rotations[b]);
-      values.block<1, joint_features>(p, b * joint_features) = seen;
+      const JointFeatures features = joint_features_of(pose.rotations[b]);
+      values.block<1, joint_features>(p, b * joint_features) = features;
       if (reflection.exists())
         values.block<1, joint_features>(poses + p, reflection.twin(b) * joint_features) =
-            reflection.maps[b] * seen;
+            reflection.maps[b] * features;
     }
-    const Eigen::VectorXf seen = values.row(p).cast<float>();
+    const Eigen::VectorXf features = values.row(p).cast<float>();
     parallel_for(0, n, 256, [&](Index first, Index last) {
       for (Index i = first; i < last; ++i) {
         if (region_of_[i] < 0) continue;
@@ -111,8 +111,8 @@ CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::
         const auto trusted = static_cast<float>(rig.key_trust[nodes[i]]);
         Index row = 0;
         for (const Index b : regions[region_of_[i]].joints) {
-          right_[i].middleRows<joint_features>(row) +=
-              seen.segment<joint_features>(b * joint_features) * (trusted * off.cast<float>()).transpose();
+          right_[i].middleRows<joint_features>(row) += features.segment<joint_features>(b * joint_features) *
+                                                       (trusted * off.cast<float>()).transpose();
           row += joint_features;
         }
       }

@@ -110,14 +110,14 @@ std::vector<Index> NodeOwners::own_bones() const {
 
 /// Initial paths: straight ones from each bone to the visible nodes of the surfaces that contain it.
 void NodeOwners::see(const Skeleton& skeleton) {
-  std::vector<std::vector<Length>> ways(skeleton.count());
+  std::vector<std::vector<Length>> paths(skeleton.count());
   parallel_jobs(skeleton.count(), [&](Index b) {
     const Vec3 head = skeleton.bone(b).head, along = skeleton.bone(b).tail - head;
-    ways[b] = best_;
+    paths[b] = best_;
     if (skeleton.has_open_end(b)) {
       if (const Index around = surface_around(head); around >= 0) {
         for (std::size_t i = 0; i < nodes_.size(); ++i)
-          if (piece(i) == around) ways[b][i] = {straight_(static_cast<Index>(i), b), b};
+          if (piece(i) == around) paths[b][i] = {straight_(static_cast<Index>(i), b), b};
         return;
       }
     }
@@ -131,12 +131,12 @@ void NodeOwners::see(const Skeleton& skeleton) {
       for (const BoneSight& place : places)
         if (place.sides(own) >= least[own] &&
             place.sees(surfaces_.points.row(nodes_[i]), own, 0.5 * spacing_)) {
-          ways[b][i] = {straight_(static_cast<Index>(i), b), b};
+          paths[b][i] = {straight_(static_cast<Index>(i), b), b};
           break;
         }
     }
   });
-  for (const std::vector<Length>& each : ways)
+  for (const std::vector<Length>& each : paths)
     for (std::size_t i = 0; i < nodes_.size(); ++i) best_[i] = std::min(best_[i], each[i]);
 }
 
@@ -146,11 +146,11 @@ Index NodeOwners::surface_around(const Vec3& joint) const {
   std::vector<Vec3> sums(slots_.size(), Vec3::Zero());
   std::vector<Index> counts(slots_.size(), 0);
   for (Index i = 0; i < surfaces_.points.rows(); ++i) {
-    const Vec3 way = surfaces_.points.row(i).transpose() - joint;
+    const Vec3 offset = surfaces_.points.row(i).transpose() - joint;
     const Index piece = surfaces_.pieces[i];
-    least[piece] = std::min(least[piece], way.norm());
-    most[piece] = std::max(most[piece], way.norm());
-    sums[piece] += way;
+    least[piece] = std::min(least[piece], offset.norm());
+    most[piece] = std::max(most[piece], offset.norm());
+    sums[piece] += offset;
     ++counts[piece];
   }
   Index result = -1;
@@ -221,12 +221,12 @@ bool NodeOwners::lies_about(const Nodes& nodes, const Bone& bone) const {
     std::array<double, ring_sides> nearest;
     nearest.fill(std::numeric_limits<double>::infinity());
     for (const std::size_t i : nodes) {
-      const Vec3 way = axes.transpose() * (surfaces_.points.row(nodes_[i]).transpose() - bone.head);
-      const double away = std::hypot(way[0], way[2]);
-      if (std::abs(way[1] - share * length) > away) continue;
-      const double turns = std::atan2(way[0], way[2]) / (2.0 * std::numbers::pi) + 0.5;
+      const Vec3 local = axes.transpose() * (surfaces_.points.row(nodes_[i]).transpose() - bone.head);
+      const double radius = std::hypot(local[0], local[2]);
+      if (std::abs(local[1] - share * length) > radius) continue;
+      const double turns = std::atan2(local[0], local[2]) / (2.0 * std::numbers::pi) + 0.5;
       double& least = nearest[static_cast<std::size_t>(turns * ring_sides) % ring_sides];
-      least = std::min(least, away);
+      least = std::min(least, radius);
     }
     const auto [least, most] = std::ranges::minmax_element(nearest);
     if (*least > ring_share * *most) return true;
@@ -241,7 +241,7 @@ void NodeOwners::touch(const Skeleton& skeleton) {
   for (std::size_t i = 0; i < best_.size(); ++i)
     if (!has_bone(i)) without[piece(i)].push_back(i);
   if (without.empty()) return;
-  const auto [seen, all] = nodes_with_bones();
+  const auto [visible, all] = nodes_with_bones();
   const BoneTree tree(skeleton);
   for (const auto& [piece, own] : without) {
     std::vector<bool> about;
@@ -249,7 +249,7 @@ void NodeOwners::touch(const Skeleton& skeleton) {
     Nodes others;
     std::ranges::copy_if(all, std::back_inserter(others),
                          [&](std::size_t j) { return about[best_[j].second]; });
-    join(own, others.empty() ? seen : others, tree);
+    join(own, others.empty() ? visible : others, tree);
   }
 }
 
@@ -259,11 +259,11 @@ std::pair<NodeOwners::Nodes, NodeOwners::Nodes> NodeOwners::nodes_with_bones() c
   parallel_for(0, graph_.size(), 16, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i) hidden[i] = has_bone(i) && within_another(i) ? 1 : 0;
   });
-  Nodes all, seen;
+  Nodes all, visible;
   for (std::size_t i = 0; i < best_.size(); ++i)
-    if (has_bone(i)) (hidden[i] == 0 ? seen : all).push_back(i);
-  all.insert(all.end(), seen.begin(), seen.end());
-  return {seen.empty() ? all : seen, all};
+    if (has_bone(i)) (hidden[i] == 0 ? visible : all).push_back(i);
+  all.insert(all.end(), visible.begin(), visible.end());
+  return {visible.empty() ? all : visible, all};
 }
 
 /// Nodes of a surface without bones take the owners of the nearest of `others` where these touch it, but only
@@ -280,8 +280,8 @@ void NodeOwners::join(const Nodes& own, const Nodes& others, const BoneTree& tre
   }
   const double reach = std::sqrt(std::ranges::min_element(near)->first) + touching_spacings * spacing_;
   std::map<Index, float> lengths;  // of the bones that it touches
-  for (const auto& [away, j] : near)
-    if (away <= reach * reach) lengths[best_[j].second] = 0.0f;
+  for (const auto& [square, j] : near)
+    if (square <= reach * reach) lengths[best_[j].second] = 0.0f;
   for (auto& [b, length] : lengths)
     for (const std::size_t i : own) length += straight_(static_cast<Index>(i), b);
   const Index main =

@@ -87,10 +87,10 @@ RigShape::RigShape(const SurfaceSamples& given, const std::vector<Bone>& bones, 
   for (Index i = 0; i < size(); ++i) {
     double total = 0.0;
     for (const auto& edge : graph.edges(i)) {
-      const double away = static_cast<double>(edge.length) / spacing;
-      if (away > neighbour_spacings) continue;
+      const double distance = static_cast<double>(edge.length) / spacing;
+      if (distance > neighbour_spacings) continue;
       if (nodes.pieces[edge.to] != nodes.pieces[i] && stands_alone(nodes.pieces[i])) continue;
-      neighbours[i].emplace_back(edge.to, std::exp(-away * away));
+      neighbours[i].emplace_back(edge.to, std::exp(-distance * distance));
       total += neighbours[i].back().second;
     }
     for (auto& [to, weight] : neighbours[i]) weight /= total;
@@ -166,17 +166,17 @@ void RigShape::set_handles() {
     if (const Index b = holder(points.row(i), sample_nodes[i]); b >= 0) held[b].push_back(i);
   for (Index b = 0; b < skeleton.count(); ++b) {
     const Bone& bone = skeleton.bone(b);
-    const auto away = [&](Index i) {
+    const auto distance_of = [&](Index i) {
       const Vec3 point = points.row(i);
       return (skeleton.nearest(b, point) - point).norm();
     };
     std::vector<Index> all(points.rows());
     std::iota(all.begin(), all.end(), Index{0});
     const Index count = std::min<Index>(least_held, points.rows());
-    std::ranges::partial_sort(all, all.begin() + count, {}, away);
+    std::ranges::partial_sort(all, all.begin() + count, {}, distance_of);
     const std::string name =
         bone.name.empty() ? "bones[" + std::to_string(skeleton.original(b)) + "]" : "bone " + bone.name;
-    require(away(all.front()) < farthest * extent, name, "it lies far outside of the shape",
+    require(distance_of(all.front()) < farthest * extent, name, "it lies far outside of the shape",
             "move it into the shape, or make it a helper");
     if (static_cast<Index>(held[b].size()) < least_held) {
       held[b].assign(all.begin(), all.begin() + count);

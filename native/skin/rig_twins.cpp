@@ -21,9 +21,9 @@ RigTwins::RigTwins(const RigShape& rig, PointsIn points) {
   twins = OrientedPoints(points, none).nearest(reflected, none, 0.0);
   alike = twins;
   for (Index i = 0; i < points.rows(); ++i) {
-    const double away = (points.row(twins[i]) - reflected.row(i)).norm();
-    if (away > symmetric_points * rig.extent) twins[i] = -1;
-    if (away > rig.spacing) alike[i] = -1;
+    const double distance = (points.row(twins[i]) - reflected.row(i)).norm();
+    if (distance > symmetric_points * rig.extent) twins[i] = -1;
+    if (distance > rig.spacing) alike[i] = -1;
   }
 }
 

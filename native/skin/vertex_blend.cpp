@@ -33,11 +33,11 @@ VertexBlend::VertexBlend(const RigShape& rig, const PiecePoints& given, const st
       std::vector<double> kernel;
       Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
       for (const Index node : near) {
-        const Vec3 away = (Vec3(rig.nodes.points.row(node)) - point) / width;
+        const Vec3 offset = (Vec3(rig.nodes.points.row(node)) - point) / width;
         const double side = normal.dot(rig.nodes.normals.row(node).transpose());
-        const double falls = std::max(0.0, 1.0 - away.squaredNorm());
+        const double falls = std::max(0.0, 1.0 - offset.squaredNorm());
         kernel.push_back(falls * falls * falls * std::max(other_side, std::min(1.0, 0.5 + side)));
-        lines.push_back(Eigen::Vector4d(1.0, away[0], away[1], away[2]));
+        lines.push_back(Eigen::Vector4d(1.0, offset[0], offset[1], offset[2]));
         moments += kernel.back() * lines.back() * lines.back().transpose();
       }
       const double total = moments(0, 0);

@@ -215,13 +215,14 @@ class Vote {
   /// Returns outliers one by one to the inliers if a wrap with the high landmark weight reaches them with
   /// little more stretch, or brings the surface nearer to the target. A wrong pair would do neither.
   void take_back(const Similarity& at, std::vector<Index>& kept, Trial& trial) const {
-    std::vector<Index> away;
+    std::vector<Index> candidates;
     for (Index row = 0; row < trial.distances.size(); ++row)
-      if (!std::ranges::binary_search(kept, row) && trial.distances[row] < may_return) away.push_back(row);
-    if (away.empty()) return;
-    std::ranges::sort(away, {}, [&](Index row) { return trial.distances[row]; });
+      if (!std::ranges::binary_search(kept, row) && trial.distances[row] < may_return)
+        candidates.push_back(row);
+    if (candidates.empty()) return;
+    std::ranges::sort(candidates, {}, [&](Index row) { return trial.distances[row]; });
     trial = tried(at, kept, firm_pull);
-    for (const Index row : away) {
+    for (const Index row : candidates) {
       std::vector<Index> more = kept;
       more.insert(std::ranges::upper_bound(more, row), row);
       Trial with = tried(at, more, firm_pull);

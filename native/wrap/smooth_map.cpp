@@ -110,9 +110,9 @@ SmoothMap surface_map(const TriangleMesh& from, PointsIn to, const Progress& pro
   values.topRows(count) = rows_of(after, rows);
   const double size = diagonal_of(before);
   for (Index i = 0; i < sides; ++i) {
-    const double way = (i % 2 == 0 ? offset : -offset) * size;
-    centers.row(count + i) = before.row(rows[i]) + way * normals.row(rows[i]);
-    values.row(count + i) = after.row(rows[i]) + way * moved_normals.row(rows[i]);
+    const double height = (i % 2 == 0 ? offset : -offset) * size;
+    centers.row(count + i) = before.row(rows[i]) + height * normals.row(rows[i]);
+    values.row(count + i) = after.row(rows[i]) + height * moved_normals.row(rows[i]);
     least[count + i] = offset_smoothing;
   }
   return SmoothingSpline(centers, least, progress).fit(values);
@@ -122,13 +122,13 @@ template <class Visit>
 void SmoothMap::visit(PointsIn points, const Progress& progress, Visit&& visit) const {
   const Points x = in_units(points);
   parallel_for(0, x.rows(), 64, [&](Index begin, Index end) {
-    Columns ways(centers_.rows(), 3);
+    Columns offsets(centers_.rows(), 3);
     Eigen::ArrayXd distances(centers_.rows());
     if (progress.cancelled()) return;
     for (Index i = begin; i < end; ++i) {
-      ways = -(centers_.rowwise() - x.row(i).array());
-      distances = ways.square().rowwise().sum().sqrt();
-      visit(i, x.row(i), ways, distances);
+      offsets = -(centers_.rowwise() - x.row(i).array());
+      distances = offsets.square().rowwise().sum().sqrt();
+      visit(i, x.row(i), offsets, distances);
     }
   });
   progress.check();
@@ -136,7 +136,7 @@ void SmoothMap::visit(PointsIn points, const Progress& progress, Visit&& visit) 
 
 Points SmoothMap::at(PointsIn points, const Progress& progress) const {
   Points result(points.rows(), 3);
-  visit(points, progress, [&](Index i, const auto& x, const auto& /*ways*/, const auto& distances) {
+  visit(points, progress, [&](Index i, const auto& x, const auto& /*offsets*/, const auto& distances) {
     result.row(i) = affine_.row(0) + x * affine_.bottomRows<3>() +
                     distances.cube().matrix().transpose() * weights_.matrix();
   });
@@ -145,8 +145,8 @@ Points SmoothMap::at(PointsIn points, const Progress& progress) const {
 
 std::vector<Mat3> SmoothMap::jacobians(PointsIn points, const Progress& progress) const {
   std::vector<Mat3> result(points.rows());
-  visit(points, progress, [&](Index i, const auto& /*x*/, const auto& ways, const auto& distances) {
-    const Columns slopes = ways.colwise() * (3.0 * distances);
+  visit(points, progress, [&](Index i, const auto& /*x*/, const auto& offsets, const auto& distances) {
+    const Columns slopes = offsets.colwise() * (3.0 * distances);
     result[i] =
         (affine_.bottomRows<3>().transpose() + weights_.matrix().transpose() * slopes.matrix()) / size_;
   });

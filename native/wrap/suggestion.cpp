@@ -52,11 +52,11 @@ struct FarPlaces {
       if (k == 0) nearest.setConstant(std::numeric_limits<double>::infinity());
       std::vector<float> start(nodes, std::numeric_limits<float>::infinity());
       start[row] = 0.0F;
-      const std::vector<float> away = graph.distances_from(std::move(start));
+      const std::vector<float> distances = graph.distances_from(std::move(start));
       bool largest = true;
       for (Index i = 0; i < nodes; ++i) {
-        nearest[i] = std::min(nearest[i], static_cast<double>(away[i]));
-        if (away[i] < reach && means[i] > means[row]) largest = false;
+        nearest[i] = std::min(nearest[i], static_cast<double>(distances[i]));
+        if (distances[i] < reach && means[i] > means[row]) largest = false;
       }
       rows.push_back(row);
       is_end.push_back(largest);
@@ -104,10 +104,10 @@ std::vector<Landmark> suggest_landmarks(const SurfaceSamples& samples, const Imp
     Vec3 place = target.points.row(landed[i]);
     double nearest = same_end * target.diagonal;
     for (Index k = 0; here.is_end[i] && k < there.points.rows(); ++k) {
-      const double away = (there.points.row(k) - moved.row(i)).norm();
-      const bool is_mutual = (moved.rowwise() - there.points.row(k)).rowwise().norm().minCoeff() >= away;
-      if (!there.is_end[k] || !is_mutual || away >= nearest) continue;
-      nearest = away;
+      const double distance = (there.points.row(k) - moved.row(i)).norm();
+      const bool is_mutual = (moved.rowwise() - there.points.row(k)).rowwise().norm().minCoeff() >= distance;
+      if (!there.is_end[k] || !is_mutual || distance >= nearest) continue;
+      nearest = distance;
       place = there.points.row(k);
     }
     result.push_back({samples.frame.to_mesh(here.points.row(i)).row(0), place});

@@ -81,11 +81,11 @@ Index RadialSolver::add_fold_samples(double barrier) {
   const ThreadScope threads(s.problem.options.threads);
   const std::vector<Index>& chosen = s.problem.energy_samples;
   // Samples that are no energy samples, in spatial order.
-  std::vector<bool> seen(static_cast<std::size_t>(s.problem.samples.size()), false);
-  for (const Index i : chosen) seen[static_cast<std::size_t>(i)] = true;
+  std::vector<bool> is_chosen(static_cast<std::size_t>(s.problem.samples.size()), false);
+  for (const Index i : chosen) is_chosen[static_cast<std::size_t>(i)] = true;
   std::vector<Index> unseen;
   for (const std::uint32_t i : s.problem.shape->order)
-    if (!seen[i]) unseen.push_back(i);
+    if (!is_chosen[i]) unseen.push_back(i);
   // Those at which the field folds, or nearly does.
   const Index count = static_cast<Index>(unseen.size());
   JetBlock<double> jets(count, JetOrder::first);

@@ -51,14 +51,14 @@ Twist twist_between(const Points& from, const Points& to, const Vector& weights,
   Twist twist;
   const double total = weights.sum();
   if (from.rows() == 0 || !(total > 0.0)) return twist;
-  const Points middle = 0.5 * (from + to), ways = (to - from) / seconds;
-  const Vec3 center = middle.transpose() * weights / total, mean = ways.transpose() * weights / total;
+  const Points middle = 0.5 * (from + to), velocities = (to - from) / seconds;
+  const Vec3 center = middle.transpose() * weights / total, mean = velocities.transpose() * weights / total;
   Mat3 inertia = Mat3::Zero();
   Vec3 moment = Vec3::Zero();
   for (Index i = 0; i < middle.rows(); ++i) {
     const Vec3 arm = middle.row(i).transpose() - center;
     inertia += weights[i] / total * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose());
-    moment += weights[i] / total * arm.cross(ways.row(i).transpose() - mean);
+    moment += weights[i] / total * arm.cross(velocities.row(i).transpose() - mean);
   }
   inertia += (thinnest * inertia.trace() + smallest) * Mat3::Identity();
   twist.turn = solve_definite(inertia, moment);

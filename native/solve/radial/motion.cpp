@@ -155,8 +155,8 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
   // Update position, velocity and acceleration.
   const VectorF du = state_.measurements(state_.fast) - u;
   const double further = 1.0 + remaining_step(du, inertia);
-  const RowMatrix<double> way = further * (coefficients - q), next = (q + way - ahead) / unit;
-  coefficients = q + way / w;
+  const RowMatrix<double> step = further * (coefficients - q), next = (q + step - ahead) / unit;
+  coefficients = q + step / w;
   state_.set_measurements<float>(state_.fast, u + static_cast<float>(further / w) * du);
   RowMatrix<double> both(q.rows(), 6);
   both << v + h_ * ((1.0 - gamma) * a + gamma * next), next;
@@ -176,9 +176,9 @@ double TimeIntegrator::remaining_step(const VectorF& du, double inertia) const {
   const RadialObjective<float>& objective = *state_.fast.objective.latest();
   VectorF cotangents;
   objective.value(state_.measurements(state_.fast), &cotangents);
-  const Points way = objective.sample_values(du).cast<double>();
-  const double curvature =
-      inertia * body_.masses().dot(way.rowwise().squaredNorm()) / static_cast<double>(way.rows());
+  const Points displacements = objective.sample_values(du).cast<double>();
+  const double curvature = inertia * body_.masses().dot(displacements.rowwise().squaredNorm()) /
+                           static_cast<double>(displacements.rows());
   const double share = -cotangents.cast<double>().dot(du.cast<double>()) / curvature;
   return std::abs(share) < most_left ? share : 0.0;
 }

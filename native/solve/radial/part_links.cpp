@@ -46,9 +46,9 @@ RowMatrix<double> PartLinks::values(const RowMatrix<double>& at_from, const RowM
   const Index count = from_.rows();
   RowMatrix<double> result = at_to - at_from;
   for (Index i = 0; i < count; ++i) {
-    const Vec3 way = (to_.row(i) - from_.row(i)).transpose();
-    for (int k = 0; k < 3; ++k) result.row(i) -= way[k] * at_from.row(first_column(k) * count + i);
-    result.row(i) /= way.norm();
+    const Vec3 link = (to_.row(i) - from_.row(i)).transpose();
+    for (int k = 0; k < 3; ++k) result.row(i) -= link[k] * at_from.row(first_column(k) * count + i);
+    result.row(i) /= link.norm();
   }
   return std::sqrt(link_weight) * result;
 }
