@@ -119,7 +119,7 @@ def test_an_export_and_what_cannot_be_baked(scene, command):
         (["--frames", "5-1"], "is not A-B"),
         (["--objects", "None"], "no mesh object named None"),
         (["--folder", folder / "gone/too"], "no such folder"),
-        (["--folder", folder / "bar.usdc"], f"arapfields: {folder / 'bar.usdc'}: File exists"),
+        (["--folder", folder / "bar.usdc"], f"arapfields: {folder / 'bar.usdc'}: "),
         (["-o", folder / "bar.abc", "--shard", "1/2"], "an exported file has no parts"),
     ):
         done = command(*bake, *arguments, check=False)
