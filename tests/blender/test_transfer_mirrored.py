@@ -55,7 +55,9 @@ def handed_on(mirrored):
     item, target = scenes.bar(), scenes.bar("Other")
     target.data.transform(Matrix(np.vstack([np.c_[TURN, SHIFT], [0, 0, 0, 1]]).tolist()))
     item.shape_key_add(name="Basis")
-    for point in item.shape_key_add(name="Tall").data:
+    tall = item.shape_key_add(name="Tall")
+    tall.value = 0.0  # Blender 5.2 adds keys with 1
+    for point in tall.data:
         point.co.z += 0.3 * point.co.x**2 + 0.1 * point.co.y
         point.co.x += 0.1
     paint = item.data.color_attributes.new("Paint", "FLOAT_COLOR", "CORNER")
