@@ -53,9 +53,8 @@ def test_a_result_waits_for_the_end_of_edit_mode():
     assert scenes.world_points(bar)[:, 2].max() > 0.4
 
 
-@pytest.mark.parametrize("ends", ["FINISHED", "CANCELLED"])
-def test_a_result_takes_the_modifier_that_a_first_shape_made(ends):
-    """Its inputs may be in the user's hands: Blender crashed when it went."""
+def shown_first():
+    """The bar, its job's coroutine, and the preview, which shows the first shape."""
     stage = stages.Stage("window")
     bar, _ = stage.begin()
     operator = stage.operator()
@@ -63,10 +62,17 @@ def test_a_result_takes_the_modifier_that_a_first_shape_made(ends):
     stage.start(operator)
     preview = jobs.running().items[0].preview
     preview.show(preview.points.astype("f4"))
+    return bar, stage.coroutine, preview
+
+
+@pytest.mark.parametrize("ends", ["FINISHED", "CANCELLED"])
+def test_a_result_takes_the_modifier_that_a_first_shape_made(ends):
+    """Its inputs may be in the user's hands: Blender crashed when it went."""
+    bar, coroutine, preview = shown_first()
     inputs.put(bar.modifiers[0], "Factor", 0.5)
     if ends == "CANCELLED":
         jobs.running().cancel()
-    assert steps_until(stage.coroutine, lambda: False) == {ends}
+    assert steps_until(coroutine, lambda: False) == {ends}
     preview.clear()  # as the window's display does in the end
     if ends == "CANCELLED":
         assert not bar.modifiers
@@ -81,20 +87,14 @@ def test_a_result_takes_the_modifier_that_a_first_shape_made(ends):
 
 
 def test_a_first_shape_goes_where_its_result_is_refused():
-    stage = stages.Stage("window")
-    bar, _ = stage.begin()
-    operator = stage.operator()
-    operator.in_window = True
-    stage.start(operator)
-    preview = jobs.running().items[0].preview
-    preview.show(preview.points.astype("f4"))
+    bar, coroutine, preview = shown_first()
 
     def refuse(*given):
         raise UserError("no")
 
     places, placement.place_result = placement.place_result, refuse
     try:
-        assert steps_until(stage.coroutine, lambda: False) == {"CANCELLED"}
+        assert steps_until(coroutine, lambda: False) == {"CANCELLED"}
     finally:
         placement.place_result = places
     preview.clear()
