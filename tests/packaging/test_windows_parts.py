@@ -2,10 +2,13 @@
 """What can be checked of Windows without one: the library by mingw-w64, its tests by Wine."""
 
 import json
+import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -14,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from tests.windows import __main__ as windows  # noqa: E402
+from tests.windows import environment  # noqa: E402
 from tests.windows.not_run import NOT_RUN  # noqa: E402
 
 TOOLS = ("x86_64-w64-mingw32-g++-posix", "make")
@@ -39,6 +43,18 @@ def test_a_folder_without_enough_that_passed_is_no_success():
     assert windows.table({"a": {"b": ("passed", "")}})
     for found in ({}, {"b": ("passed", ""), "c": ("skipped", "")}, {"b": ("begun", "")}):
         assert not windows.table({"a": found})
+
+
+def test_a_run_ends_with_its_process(tmp_path, monkeypatch):
+    """What a test leaves behind holds the pipe for a minute."""
+    (tmp_path / "python.exe").write_text("sleep 60 &\necho $! begun\nexec sleep $1")
+    monkeypatch.setattr(environment, "WINE", "/bin/sh")
+    monkeypatch.setattr(environment, "LAST_LINES", 0.5)
+    for seconds, status, words in (("x", 1, "begun"), ("0", 0, "begun"), ("60", 124, "more than 1 seconds")):
+        begun = time.monotonic()
+        done = environment.run(tmp_path, seconds, seconds=1)
+        assert done.returncode == status and words in done.stdout and time.monotonic() - begun < 20
+        os.kill(int(done.stdout.split()[0]), signal.SIGKILL)
 
 
 def test_what_does_not_run_under_wine_is_there():

@@ -111,6 +111,7 @@ def main():
     if not given.files:
         (zip_file,) = given.dist.resolve().glob("arapfields-*-windows-x64.zip")
         good &= extension(folder, zip_file)
+    environment.end_all()
     sys.exit(0 if good else 1)
 
 

@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import threading
 import zipfile
 from pathlib import Path
 
@@ -19,6 +20,7 @@ PREFIX = ROOT / "build/wine"
 COMPILER, DUMP = "x86_64-w64-mingw32-gcc-posix", "x86_64-w64-mingw32-objdump"
 BUILTIN = b"Wine builtin DLL"
 WINE = shutil.which("wine64") or shutil.which("/usr/lib/wine/wine64")
+WINESERVER = shutil.which("wineserver64") or shutil.which("/usr/lib/wine/wineserver64")
 EMBEDDED = {  # versions of the package, whose newest file contains 3.11.9 and 3.13.2
     "3.11": "3.11.0 --hash=sha256:8a4dbddadc63ca9700370bc95e5a8e27a03c00c7ac6ab3877102bd9bb4c4f5fa",
     "3.13": "3.13.0 --hash=sha256:6e57af03c2cb64dd5191f76274b97fc630b3001bde59f82cf1e252e7e02d6754",
@@ -30,6 +32,7 @@ BLENDERS = {
 # Blender 5.2 maps files by it into placeholders, which Wine 8 lacks; without it, Blender works as 4.5.
 NEWER = b"\0VirtualAlloc2\0"
 SECONDS = 5400  # time limit of a folder's tests
+LAST_LINES = 10  # seconds within which the last lines of a process that ended are read
 
 
 def pip(*arguments):
@@ -125,8 +128,8 @@ def run(folder, *arguments, seconds=SECONDS, **environment):
         "LC_ALL": "C.UTF-8",  # encoding of file names
         "WINEPREFIX": str(PREFIX),
         "WINEDEBUG": "-all",
-        # The explorer would inherit the pipes, and keep them open.
-        "WINEDLLOVERRIDES": "explorer.exe=d;ucrtbase=n,b",
+        # The explorer would inherit the pipes, and keep them open; the debugger of a crash may never end.
+        "WINEDLLOVERRIDES": "explorer.exe=d;winedbg.exe=d;ucrtbase=n,b",
         "PYTHONPATH": paths,
         "PYTHONDONTWRITEBYTECODE": "1",
         "PYTHONIOENCODING": "utf-8",
@@ -134,19 +137,26 @@ def run(folder, *arguments, seconds=SECONDS, **environment):
         "PYTORCH_JIT": "0",  # needs sources that the embeddable Python lacks
         **environment,
     }
-    command = [WINE, folder / "python.exe", *arguments]
+    command = [str(part) for part in (WINE, folder / "python.exe", *arguments)]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    process = subprocess.Popen(
+        command, cwd=ROOT, env=environment, encoding="utf-8", errors="replace", **pipes
+    )
+    process.stdin.close()
+    lines = []
+    # A process that a test leaves behind keeps the pipe open: the reading then has no end.
+    reader = threading.Thread(target=lines.extend, args=[process.stdout], daemon=True)
+    reader.start()
     try:
-        return subprocess.run(
-            [*map(str, command)],
-            cwd=ROOT,
-            env=environment,
-            input="",
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            encoding="utf-8",
-            errors="replace",
-            timeout=seconds,
-        )
-    except subprocess.TimeoutExpired as expired:
-        said = (expired.stdout or b"").decode("utf-8", "replace")
-        return subprocess.CompletedProcess(command, 124, f"{said}\nmore than {seconds} seconds")
+        status = process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        status = 124
+    reader.join(LAST_LINES)
+    said = "".join(lines) + (f"\nmore than {seconds} seconds" if status == 124 else "")
+    return subprocess.CompletedProcess(command, status, said)
+
+
+def end_all():
+    """Ends the processes that tests left behind."""
+    subprocess.run([WINESERVER, "-k"], env={**os.environ, "WINEPREFIX": str(PREFIX)}, check=False)
