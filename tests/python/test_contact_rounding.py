@@ -84,3 +84,11 @@ def test_legs_are_crossed_in_one_go(k, centers):
         assert not report.contact.held and report.contact.deepest < STILL_DEEP
         energies.append(report.energy)
     assert max(energies) < ALIKE_IN_ENERGY * min(energies)
+
+
+def test_legs_that_slide_past_each_other_do_so_with_few_centers():
+    """With all centers 40 iterations; 82 where they slid with all of them."""
+    (case,) = [case for case in contact_cases.figures() if case.name == "legs crossed 0"]
+    samples = af.sample_surface(contact_cases.BODIES["figure"], 20000, seed=0)
+    report = af.deform(samples, case.handles, contact=af.Contact(itself=True)).report
+    assert report.iterations <= 60 and not report.contact.held and report.contact.deepest < STILL_DEEP

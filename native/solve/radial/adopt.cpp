@@ -42,7 +42,7 @@ VectorF measured(RadialState& s, const DeformationField& field) {
 /// Least-squares fit in the norm of the quadratic model (RadialObjective::weighted), by preconditioned
 /// conjugate gradients (Nocedal & Wright 2006, algorithm 5.3). Rounding errors of single precision grow with
 /// the iterations, so they end when the energy no longer decreases.
-void RadialSolver::adopt(const DeformationField& field) {
+void RadialSolver::adopt(const DeformationField& field, const ContactReport& contact) {
   constexpr int rounds = 8;
   RadialState& s = *state_;
   const ThreadScope threads(s.problem.options.threads);
@@ -73,6 +73,8 @@ void RadialSolver::adopt(const DeformationField& field) {
     square = next;
   }
   s.dynamics.zero_velocity(motions_of(s.handles.bound()));
+  s.report.contact = contact;
+  s.tried = {s.handles.pairs().targets, coefficients};
   s.contact.begin(s.problem.basis.identity());  // the other field may have crossed a sheet
 }
 

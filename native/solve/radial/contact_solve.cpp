@@ -74,18 +74,17 @@ void ContactSolve::follow() {
   RadialState& s = state_;
   const bool goes_on = s.contact.ended_at(s.shape.revision);
   steps_.sweep(motions_);
-  const bool pressed = s.contact.has_planes();
+  const bool pressed = s.contact.has_planes() || s.report.contact.touching > 0.0;
   s.contact.find(s.shape.coefficients);
   if (!goes_on && s.contact.deepest_outside() > ContactApproach::too_deep) start_at_rest();
   if (escapes_local_minimum()) return;
-  bool slowly = s.in_one_go && !s.contact.crossing_surfaces().empty();
+  const bool slowly = s.in_one_go && !s.contact.crossing_surfaces().empty();
   const bool leaps = s.contact.only_itself() && longest_motion() > steps_.length(ContactApproach::usual);
   if (leaps || (!pressed && may_be_without_contact())) {
     const RowMatrix<double> start = s.shape.coefficients;
     if (ends_without_contact()) return;
     const bool parts_overlap = s.contact.deepest_outside() <= 0.0;
     if (parts_overlap && separates_parts(leaps ? most_solves_apart : 1)) return;
-    slowly = slowly || (parts_overlap && s.in_one_go);
     go_back(start);
   }
   approach(slowly);
@@ -188,21 +187,25 @@ bool ContactSolve::separates_parts(int most_solves) {
   return apart;
 }
 
-/// Continuation in usual steps; `slowly`: in small steps as well, and the better of both results is kept.
+/// Whether points are left inside an obstacle, or parts in each other.
+bool ContactSolve::is_inside() const {
+  return state_.contact.deepest_outside() > ContactApproach::nearly ||
+         state_.contact.overlaps(state_.shape.coefficients);
+}
+
+/// Continuation in usual steps; `slowly`, or where that leaves points inside: in small steps as well, and the
+/// better of both results is kept.
 void ContactSolve::approach(bool slowly) {
   const RowMatrix<double> start = state_.shape.coefficients;
   steps_.approach(motions_, longest_motion(), ContactApproach::usual);
+  slowly = slowly || (state_.in_one_go && is_inside());
   if (slowly && longest_motion() > steps_.length(ContactApproach::small)) approach_again_slowly(start);
   report_contact(state_);
 }
 
 void ContactSolve::approach_again_slowly(const RowMatrix<double>& start) {
   RadialState& s = state_;
-  const auto badness = [&] {
-    const bool inside =
-        s.contact.deepest_outside() > ContactApproach::nearly || s.contact.overlaps(s.shape.coefficients);
-    return std::pair(inside, value_without_contact(s));
-  };
+  const auto badness = [&] { return std::pair(is_inside(), value_without_contact(s)); };
   const std::pair<bool, double> bad = badness();
   const RowMatrix<double> there = s.shape.coefficients;
   ContactSnapshot snapshot = s.contact.snapshot();

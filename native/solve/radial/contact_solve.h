@@ -28,6 +28,7 @@ class ContactSolve {
   bool may_be_without_contact() const;
   bool ends_without_contact();
   bool separates_parts(int most_solves);
+  bool is_inside() const;
   void approach(bool slowly);
   void approach_again_slowly(const RowMatrix<double>& start);
   void go_back(const RowMatrix<double>& coefficients);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "core/parallel.h"
 #include "solve/radial/radial_solver.h"
@@ -30,6 +31,10 @@ constexpr double less_where_held = 10.0;
 /// A deformation with at least `worth_a_first` centers starts from a solve with half of them, `most_first` at
 /// most, of `first_steps` iterations.
 constexpr int worth_a_first = 600, most_first = 500, first_steps = 20;
+/// Where contact holds handles back, which slide slowly, it continues, at most `most_slides` times, while
+/// `solves_a_slide` solves reduce their distance or the energy to less than the fraction `least_slide`.
+constexpr int most_slides = 12, solves_a_slide = 3;
+constexpr double least_slide = 0.99;
 /// Centers, samples and iterations of the coarse solve that a stylization starts from.
 constexpr int style_first_centers = 400, style_first_samples = 4000, style_first_steps = 30;
 /// A styled field that folds between the energy samples is solved again, in rounds, with the folded samples
@@ -77,14 +82,34 @@ struct Bounds {
   double least_gain = 0.0;  ///< least relative decrease in `steps_at_once` iterations
 };
 
+/// Sum of the distances of handles that are held back.
+double distance_held(const ContactReport& contact) {
+  double sum = 0.0;
+  for (const HeldBack& handle : contact.held) sum += handle.distance;
+  return sum;
+}
+
+/// Continues a coarse solve in which contact holds handles back.
+void slide(RadialSolver& coarse, int iterations, const Progress& progress) {
+  double held = distance_held(coarse.report().contact);
+  double value = std::numeric_limits<double>::infinity();
+  for (int times = 0; held > 0.0 && times < most_slides; ++times) {
+    const double done = static_cast<double>(times) / most_slides;
+    for (int solve = 0; solve < solves_a_slide; ++solve)
+      coarse.solve(std::min(steps_at_once, iterations), 0.0, progress.part(done, done));
+    const double before = std::exchange(held, distance_held(coarse.report().contact));
+    const double higher = std::exchange(value, coarse.report().value);
+    if (held >= least_slide * before && value >= least_slide * higher) break;
+  }
+}
+
 /// Decides after each `steps_at_once` iterations whether more of them are worth it.
 class Convergence {
  public:
   Convergence(double least, bool contact) : least_gain_(least), contact_(contact) {}
   bool continues(const RadialReport& report, int iterations) {
     const ContactReport& contact = report.contact;
-    double held = 0.0;
-    for (const HeldBack& handle : contact.held) held += handle.distance;
+    const double held = distance_held(contact);
     const double gain = value_ - report.value;
     const double least = (contact.held.empty() ? 1.0 : less_where_held) * least_gain_ * report.value;
     const bool gains = report.iterations >= iterations && gain >= least;
@@ -181,6 +206,7 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   const auto shape = std::make_shared<const RestShape>(
       samples, fine.interior, static_cast<std::uint64_t>(options.training.seed), progress, axis);
   std::shared_ptr<RadialField> first;
+  ContactReport contact_first;
   if (exact != nullptr || fine.fine_centers >= worth_a_first) {
     LiveOptions few = live_options(options);
     few.symmetry = options.symmetry;
@@ -189,13 +215,16 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
     few.tolerance = LiveOptions().tolerance;
     RadialSolver solver(samples, handles, few, progress.part(0.0, 0.1), shape);
     solver.set_contact(hooks.contact, true, progress);
-    first = solver.solve(std::min(first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
+    solver.solve(std::min(first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.13));
+    slide(solver, options.training.iterations, progress.part(0.13, 0.15));
+    contact_first = solver.report().contact;
+    first = solver.field();
     progress.preview([&](PointsIn points) { return around(first)->at(points); });
   }
   const double done = first ? 0.15 : 0.0;
   RadialSolver solver(samples, handles, fine, progress.part(done, 0.4), shape, blend);
   solver.set_contact(hooks.contact, true, progress);
-  if (first) solver.adopt(*first);
+  if (first) solver.adopt(*first, contact_first);
   const Shown shown = [&] { return around(solver.field()); };
   LoopResult loop =
       run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0, shown, {.least_gain = least_gain});

@@ -75,8 +75,9 @@ class ARAPFIELDS_EXPORT RadialSolver {
   void set_motion_state(const MotionState& state);
   /// Back to the identity, and the handles' targets to rest.
   void reset();
-  /// Starts the next solve from a least-squares fit of another field.
-  void adopt(const DeformationField& field);
+  /// Starts the next solve from a least-squares fit of another field, with the contact report of the solve
+  /// that found it, whose trials are not repeated.
+  void adopt(const DeformationField& field, const ContactReport& contact = {});
 
   /// The number of samples at which the field folds. If there are any, these and the nearly folded ones join
   /// the samples of the energy, and the fold barrier gets this weight.

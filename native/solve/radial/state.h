@@ -97,7 +97,7 @@ struct RadialState {
   struct Tried {
     Points targets;                  ///< of the handles
     RowMatrix<double> coefficients;  ///< the solution
-  } tried;                           ///< last trial of ContactSolve::comes_apart()
+  } tried;                           ///< ContactSolve's last solve without contact
   bool in_one_go = false;            ///< handles jump to their targets, unlike in a drag
   RadialHooks hooks;
   Revision hooks_revision = 0;
