@@ -188,6 +188,16 @@ def test_top_level_folders_are_documented():
     assert not undocumented, undocumented
 
 
+def test_an_installed_zip_is_tested_without_the_addons_sources():
+    """Slow tests alone run these scripts, in Blenders that cannot import them."""
+    scripts = [*(ROOT / "tests/support/blender").glob("installed*.py")]
+    for path in (
+        *scripts,
+        *(path.with_name(f"{one}.py") for path in scripts for one in ("scenes", "riders")),
+    ):
+        assert not re.search(r"^(from|import) addon\b", path.read_text(), flags=re.M), name(path)
+
+
 def test_test_files_import_helpers_alone():
     """What several use lies in tests/support; a test in Blender imports at the top, as other files do."""
     for path in (ROOT / "tests").rglob("test_*.py"):

@@ -7,8 +7,6 @@ import bmesh
 import bpy
 import numpy as np
 
-from addon.field_modifier import inputs
-
 QUICK = {"iterations": 40, "samples": 1000, "batch": 100, "width": 32, "layers": 2}
 
 NEW = QUICK | {"result": "NEW"}
@@ -183,6 +181,8 @@ def delete(item):
 
 def reading_nodes(item, read):
     """Adds a Geometry Nodes modifier without effect that has the object `read` as an input."""
+    from addon.field_modifier import inputs  # tests of an installed zip have no `addon`
+
     group = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
