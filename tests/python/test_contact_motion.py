@@ -89,6 +89,15 @@ def test_a_drag_onto_a_ball_ends_where_more_steps_end(samples):
     assert held.handle == 1 and held.by == "obstacles[0]"
 
 
+def test_a_report_is_of_the_contact_that_is_set(samples):
+    pressed = live(samples, af.Contact([af.Obstacle(BALL)]))
+    pressed.solve([LEFT, turned(0, shift=(0, 0.3, -1.2)) @ RIGHT])
+    assert pressed.report.contact.touching > 0
+    pressed.set_contact(None)
+    pressed.solve()
+    assert pressed.report.contact.touching == 0
+
+
 def test_a_drag_onto_an_edge_goes_on_as_it_went():
     """Each step starts one step further than the last one. 102 iterations, and 236 from where that ended."""
     case = contact_cases.pressed_bar("edge")

@@ -141,6 +141,7 @@ void RadialSolver::set_contact(const std::optional<Contact>& contact, bool in_on
   if (contact && contact->any()) state_->contact.prepare(progress);
   state_->in_one_go = in_one_go;
   state_->contact.set(contact, state_->shape.coefficients);
+  if (!state_->contact.has_planes()) state_->report.contact = {};  // of other obstacles
 }
 
 void RadialSolver::set_targets(const std::vector<Handle>& moved) { state_->handles.set_targets(moved); }
