@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "solve/radial/contact_forces.h"
-#include "solve/radial/contact_handles.h"
 #include "solve/radial/handle_motion.h"
 
 namespace arapfields {
@@ -101,10 +100,14 @@ void ContactApproach::sweep(const std::vector<Mat4>& motions) {
     s.contact.move_obstacles(static_cast<double>(k) / static_cast<double>(steps), true);
     find_and_push(1, too_deep);
     if (k == steps || !s.contact.has_planes()) continue;
-    s.objective(s.fast);
-    set_reachable_targets(s, motions);
-    solve_round(RowMatrix<double>(s.shape.coefficients), at_once);
+    step(motions, at_once);
   }
+}
+
+void ContactApproach::step(const std::vector<Mat4>& motions, Index iterations, Pull pull) {
+  state_.objective(state_.fast);
+  set_reachable_targets(state_, motions, pull);
+  solve_round(RowMatrix<double>(state_.shape.coefficients), iterations);
 }
 
 void ContactApproach::approach(const std::vector<Mat4>& motions, double distance, const Pace& pace) {
@@ -123,9 +126,7 @@ void ContactApproach::approach_by(const std::vector<Mat4>& motions, Index steps,
   const int uses = s.fast.uses;
   for (Index k = 1; k < steps; ++k) {
     const double share = static_cast<double>(k) / static_cast<double>(steps);
-    s.objective(s.fast);
-    set_reachable_targets(s, motions_between(s.handles.bound(), motions, share));
-    solve_round(RowMatrix<double>(s.shape.coefficients), on_the_way);
+    step(motions_between(s.handles.bound(), motions, share), on_the_way);
   }
   solve_to_targets(motions_between(s.handles.bound(), motions, 1.0), to_its_end,
                    steps == 1 ? &start : nullptr);

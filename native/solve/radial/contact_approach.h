@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "solve/radial/contact_handles.h"
 #include "solve/radial/state.h"
 
 namespace arapfields {
@@ -35,6 +36,8 @@ class ContactApproach {
   void approach(const std::vector<Mat4>& motions, double distance, const Pace& pace);
   /// The same in one step.
   void approach_at_once(const std::vector<Mat4>& motions) { approach_by(motions, 1, 0); }
+  /// One step: quasi-Newton iterations with the handles' targets at `motions`, and a search for planes.
+  void step(const std::vector<Mat4>& motions, Index iterations, Pull pull = Pull::short_where_held);
   double length(const Pace& pace) const { return state_.contact.itself() ? pace.length_itself : pace.length; }
 
  private:

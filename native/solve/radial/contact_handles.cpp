@@ -30,17 +30,18 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
   return by;
 }
 
-void set_reachable_targets(RadialState& s, std::vector<Mat4> motions, bool gently) {
+void set_reachable_targets(RadialState& s, std::vector<Mat4> motions, Pull pull) {
   const std::vector<Index> by = hold_back(s, motions);
   Points targets = s.handles.targets_at(motions);
   RadialObjective<float>& objective = *s.fast.objective.latest();
-  const Index own = gently && s.contact.itself() && s.handles.any() ? s.handles.own_count() : 0;
+  const bool pulls_short = pull != Pull::full && s.contact.itself() && s.handles.any();
+  const Index own = pulls_short ? s.handles.own_count() : 0;
   const Index itself = s.contact.surface_count() - 1;
   const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();
   for (Index first = 0, last = 0; first < own; first = last) {
     const Index handle = s.handles.handle_of(first);
     while (last < own && s.handles.handle_of(last) == handle) ++last;
-    if (by[static_cast<std::size_t>(handle)] != itself) continue;
+    if (pull != Pull::short_for_all && by[static_cast<std::size_t>(handle)] != itself) continue;
     const Points left = (targets - values).middleRows(first, last - first);
     const double length = std::sqrt(left.rowwise().squaredNorm().mean());
     if (length > longest_pull)

@@ -2,6 +2,7 @@
 #include "solve/radial/contact_solve.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "solve/radial/contact_handles.h"
@@ -14,6 +15,8 @@ namespace {
 constexpr Index steps_apart = 60;
 /// Most solves of separates_parts() after a leap: the first one often leaves parts a little in each other.
 constexpr int most_solves_apart = 3;
+/// Most steps with short pulls, where handles cannot reach their targets.
+constexpr int most_pulls = 3;
 /// Relative decrease of the energy with which its solution replaces the current one.
 constexpr double better = 0.01;
 
@@ -200,7 +203,33 @@ void ContactSolve::approach(bool slowly) {
   steps_.approach(motions_, longest_motion(), ContactApproach::usual);
   slowly = slowly || (state_.in_one_go && is_inside());
   if (slowly && longest_motion() > steps_.length(ContactApproach::small)) approach_again_slowly(start);
+  if (state_.in_one_go && state_.contact.overlaps(state_.shape.coefficients)) approach_while_apart(start);
   report_contact(state_);
+}
+
+/// Continuation in small steps that ends where the next one would put a part into another or press it flat,
+/// and from there as far as short pulls lead.
+void ContactSolve::approach_while_apart(const RowMatrix<double>& start) {
+  if (state_.contact.overlaps(start)) return;
+  const BoundHandles& handles = state_.handles.bound();
+  go_back(start);
+  state_.contact.find(start);
+  const auto steps = static_cast<Index>(std::ceil(longest_motion() / steps_.length(ContactApproach::small)));
+  for (Index k = 1; k <= steps; ++k) {
+    const double share = static_cast<double>(k) / static_cast<double>(steps);
+    if (!stays_apart(motions_between(handles, motions_, share), Pull::short_where_held)) break;
+  }
+  for (int pull = 0; pull < most_pulls; ++pull)
+    if (!stays_apart(motions_of(handles), Pull::short_for_all)) break;
+}
+
+/// Takes a step, and takes it back if parts overlap after it.
+bool ContactSolve::stays_apart(const std::vector<Mat4>& motions, Pull pull) {
+  Before before(state_);
+  steps_.step(motions, ContactApproach::small.iterations, pull);
+  if (!state_.contact.overlaps(state_.shape.coefficients)) return true;
+  before.restore(state_);
+  return false;
 }
 
 void ContactSolve::approach_again_slowly(const RowMatrix<double>& start) {

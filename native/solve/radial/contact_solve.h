@@ -31,6 +31,8 @@ class ContactSolve {
   bool is_inside() const;
   void approach(bool slowly);
   void approach_again_slowly(const RowMatrix<double>& start);
+  void approach_while_apart(const RowMatrix<double>& start);
+  bool stays_apart(const std::vector<Mat4>& motions, Pull pull);
   void go_back(const RowMatrix<double>& coefficients);
 
   RadialState& state_;

@@ -80,7 +80,7 @@ class ContactTerms {
   /// Whether parts of the surface touched each other at the last search.
   bool touches_itself() const { return touches_itself_; }
   std::vector<Index> crossing_surfaces() const { return sides_.crossing_surfaces(); }
-  /// Whether a part is inside another one at this shape, however deep.
+  /// Whether a part is inside another one at this shape, however deep, or is pressed flat.
   bool overlaps(const RowMatrix<double>& coefficients);
 
  private:

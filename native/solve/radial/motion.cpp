@@ -96,7 +96,8 @@ void TimeIntegrator::integrate(const Progress& progress) {
     }
     const auto integrated = [&](const TimeScheme& scheme) {
       if (state_.contact.any()) state_.objective(state_.fast);
-      set_reachable_targets(state_, motions_between(state_.handles.bound(), before_, share(scheme.w)), false);
+      set_reachable_targets(state_, motions_between(state_.handles.bound(), before_, share(scheme.w)),
+                            Pull::full);
       return integrate_step(scheme, progress.part(share(0.0), share(1.0)));
     };
     const bool touches = state_.contact.found().contact_area() > 0.0;

@@ -27,8 +27,8 @@ constexpr double near_at_rest = 0.05;
 constexpr double shallow = 0.01;
 /// Largest tangential offset of a pair, in sample spacings.
 constexpr double spacings_aside = 2.0;
-/// Samples at which overlaps() takes winding numbers, and their increase over those at rest that means
-/// "inside another part".
+/// Samples at which overlaps() takes winding numbers, and their change since rest that means "inside another
+/// part", where they increase, or "pressed flat".
 constexpr Index most_probes = 500;
 constexpr double inside_another = 0.6;
 /// The same above a sample that has entered another part: less, as winding numbers are smoothed there.
@@ -276,9 +276,10 @@ Vector SelfContact::windings_below(const SampleWindings& windings, PointsIn plac
 }
 
 bool SelfContact::overlaps(PointsIn places, PointsIn normals) const {
+  if (probes_.empty()) return false;
   const SampleWindings now(places, winding_scale_ * normals, most_offset_);
-  return !probes_.empty() &&
-         (windings_below(now, places, normals) - windings_below_).maxCoeff() > inside_another;
+  const Vector change = windings_below(now, places, normals) - windings_below_;
+  return change.lpNorm<Eigen::Infinity>() > inside_another;
 }
 
 void SelfContact::remember(PointsIn places, const std::vector<FacingPair>& pairs) {

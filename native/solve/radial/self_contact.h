@@ -41,7 +41,8 @@ class SelfContact {
   /// `normals` is called only if parts are near each other. `jumped`: the last search says nothing of how the
   /// shape came here, so that all negative gaps count.
   std::vector<FacingPair> find(PointsIn places, const Normals& normals, double near, bool jumped = false);
-  /// Whether a part is inside another one, however deep, that it is outside of at rest (by winding numbers).
+  /// Whether a part is inside another one, however deep, that it is outside of at rest, or is pressed flat
+  /// (by winding numbers).
   bool overlaps(PointsIn places, PointsIn normals) const;
   const Search& last_search() const { return last_search_; }
   void set_last_search(Search search) { last_search_ = std::move(search); }
