@@ -32,8 +32,9 @@ constexpr double less_where_held = 10.0;
 /// most, of `first_steps` iterations.
 constexpr int worth_a_first = 600, most_first = 500, first_steps = 20;
 /// Where contact holds handles back, which slide slowly, it continues, at most `most_slides` times, while
-/// `solves_a_slide` solves reduce their distance or the energy to less than the fraction `least_slide`.
-constexpr int most_slides = 12, solves_a_slide = 3;
+/// `solves_a_slide` solves of `steps_a_slide` iterations, which each pull a short way, reduce their distance
+/// or the energy to less than the fraction `least_slide`.
+constexpr int most_slides = 12, solves_a_slide = 5, steps_a_slide = 4;
 constexpr double least_slide = 0.99;
 /// Centers, samples and iterations of the coarse solve that a stylization starts from.
 constexpr int style_first_centers = 400, style_first_samples = 4000, style_first_steps = 30;
@@ -96,7 +97,7 @@ void slide(RadialSolver& coarse, int iterations, const Progress& progress) {
   for (int times = 0; held > 0.0 && times < most_slides; ++times) {
     const double done = static_cast<double>(times) / most_slides;
     for (int solve = 0; solve < solves_a_slide; ++solve)
-      coarse.solve(std::min(steps_at_once, iterations), 0.0, progress.part(done, done));
+      coarse.solve(std::min(steps_a_slide, iterations), 0.0, progress.part(done, done));
     const double before = std::exchange(held, distance_held(coarse.report().contact));
     const double higher = std::exchange(value, coarse.report().value);
     if (held >= least_slide * before && value >= least_slide * higher) break;
