@@ -146,6 +146,23 @@ def test_live_playback_keeps_solved_frames_and_tells_how_many():
     assert frames.count(1, 40) < 3
 
 
+def test_a_frame_that_is_not_evaluated_yet_is_not_read():
+    """In a window the timer of live mode may run between a jump to a frame and its evaluation."""
+    item, scene = turning(8), bpy.context.scene
+    bpy.ops.arapfields.live()
+    for frame in (2, 3, 4, 1):
+        scene.frame_set(frame)
+        step(refined=True)
+    first, frames = local_points(item), sessions.live[item.session_uid].playback.frames
+    scene.frame_set(4)
+    step(refined=True)
+    before = frames.count(1, 8)
+    scene.frame_current = 1  # as a jump does: evaluated later
+    sessions.update(bpy.context, wait=PATIENCE, refined=True)
+    assert frames.count(1, 8) == before == 4
+    assert np.array_equal(local_points(item), first)
+
+
 def test_a_drag_at_a_frame_goes_on_from_the_shape_at_hand():
     bar = turning()
     before = live_at(bar, "DEFORM", [20])
