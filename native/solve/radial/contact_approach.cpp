@@ -111,8 +111,11 @@ void ContactApproach::step(const std::vector<Mat4>& motions, Index iterations, P
 }
 
 void ContactApproach::approach(const std::vector<Mat4>& motions, double distance, const Pace& pace) {
-  const auto steps = static_cast<Index>(std::ceil(distance / length(pace)));
-  approach_by(motions, std::clamp<Index>(steps, 1, pace.most_steps), pace.iterations);
+  approach_by(motions, std::max<Index>(count(distance, pace), 1), pace.iterations);
+}
+
+Index ContactApproach::count(double distance, const Pace& pace) const {
+  return std::min(static_cast<Index>(std::ceil(distance / length(pace))), pace.most_steps);
 }
 
 /// In `steps` equal steps, with `on_the_way` iterations in all but the last.

@@ -38,6 +38,8 @@ class ContactApproach {
   void approach_at_once(const std::vector<Mat4>& motions) { approach_by(motions, 1, 0); }
   /// One step: quasi-Newton iterations with the handles' targets at `motions`, and a search for planes.
   void step(const std::vector<Mat4>& motions, Index iterations, Pull pull = Pull::short_where_held);
+  /// Number of steps in which handles move by this distance, in cube units.
+  Index count(double distance, const Pace& pace) const;
   double length(const Pace& pace) const { return state_.contact.itself() ? pace.length_itself : pace.length; }
 
  private:

@@ -2,7 +2,6 @@
 #include "solve/radial/contact_solve.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "solve/radial/contact_handles.h"
@@ -203,7 +202,7 @@ void ContactSolve::approach(bool slowly) {
   steps_.approach(motions_, longest_motion(), ContactApproach::usual);
   slowly = slowly || (state_.in_one_go && is_inside());
   if (slowly && longest_motion() > steps_.length(ContactApproach::small)) approach_again_slowly(start);
-  if (state_.in_one_go && state_.contact.overlaps(state_.shape.coefficients)) approach_while_apart(start);
+  if (slowly && state_.contact.overlaps(state_.shape.coefficients)) approach_while_apart(start);
   report_contact(state_);
 }
 
@@ -214,7 +213,7 @@ void ContactSolve::approach_while_apart(const RowMatrix<double>& start) {
   const BoundHandles& handles = state_.handles.bound();
   go_back(start);
   state_.contact.find(start);
-  const auto steps = static_cast<Index>(std::ceil(longest_motion() / steps_.length(ContactApproach::small)));
+  const Index steps = steps_.count(longest_motion(), ContactApproach::small);
   for (Index k = 1; k <= steps; ++k) {
     const double share = static_cast<double>(k) / static_cast<double>(steps);
     if (!stays_apart(motions_between(handles, motions_, share), Pull::short_where_held)) break;
