@@ -171,6 +171,8 @@ def main():
         wanted.append((figure, folder))
     done = []
     for timed, jobs in ((True, 1), (False, max(1, options.jobs))):
+        if jobs > 1:  # more threads than processors would wait for each other, and busily
+            os.environ.setdefault("OMP_NUM_THREADS", str(max(1, (os.cpu_count() or 1) // jobs)))
         with ThreadPoolExecutor(jobs) as pool:
             asked = [
                 pool.submit(bring_up_to_date, *one, options.all) for one in wanted if one[0].timed == timed

@@ -34,9 +34,11 @@ MeshSdf::MeshSdf(PointsIn vertices, TrianglesIn triangles, const Progress& progr
 
 Vector MeshSdf::evaluate(PointsIn points, Points* gradients, const Progress& progress) const {
   Vector distances(points.rows());
-  distance_.evaluate(points, distances, progress);
-  if (gradients == nullptr) return distances;
-  const ClosestPoints closest = distance_.closest(points, progress);
+  if (gradients == nullptr) {
+    distance_.evaluate(points, distances, progress);
+    return distances;
+  }
+  const ClosestPoints closest = distance_.evaluate_closest(points, distances, progress);
   gradients->resize(points.rows(), 3);
   parallel_for(0, points.rows(), points_a_task, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {

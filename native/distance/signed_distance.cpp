@@ -133,6 +133,24 @@ void sides_of_clusters(const HierarchyView& view, const Block& block, const Near
       inside[std::countr_zero(rest)] = answers[c];
 }
 
+ClosestPoints closest_points(Index count) {
+  return {Points(count, 3), std::vector<std::int32_t>(static_cast<std::size_t>(count)), Vector(count)};
+}
+
+void store_closest(const Hierarchy& hierarchy, const Block& block, const Nearest* nearest,
+                   ClosestPoints& result) {
+  const HierarchyView view = hierarchy.view();
+  for (int i = 0; i < block.count; ++i) {
+    const TrianglePacket& packet = view.packets[nearest[i].packet];
+    const auto lane = std::find(packet.triangle, packet.triangle + tree_width, nearest[i].triangle);
+    const Vec3 query = Eigen::Map<const Vec3>(block.points.data() + 3 * i);
+    const Vec3 point = closest_point(packet, static_cast<int>(lane - packet.triangle), query);
+    result.points.row(block.rows[i]) = hierarchy.restored(point).transpose();
+    result.triangles[block.rows[i]] = nearest[i].triangle;
+    result.distances[block.rows[i]] = std::sqrt(nearest[i].squared_distance) / hierarchy.factor();
+  }
+}
+
 }  // namespace
 
 struct SignedDistance::Parts {
@@ -153,6 +171,18 @@ SignedDistance::SignedDistance(SignedDistance&&) noexcept = default;
 bool SignedDistance::is_closed() const { return parts_->closed; }
 
 void SignedDistance::evaluate(PointsIn points, Eigen::Ref<Vector> distances, const Progress& progress) const {
+  evaluate(points, distances, nullptr, progress);
+}
+
+ClosestPoints SignedDistance::evaluate_closest(PointsIn points, Eigen::Ref<Vector> distances,
+                                               const Progress& progress) const {
+  ClosestPoints result = closest_points(points.rows());
+  evaluate(points, distances, &result, progress);
+  return result;
+}
+
+void SignedDistance::evaluate(PointsIn points, Eigen::Ref<Vector> distances, ClosestPoints* closest,
+                              const Progress& progress) const {
   const Hierarchy& hierarchy = parts_->hierarchy;
   require_usable(points, hierarchy);
   for_blocks(points, hierarchy, progress, [&](const Block& block) {
@@ -168,6 +198,7 @@ void SignedDistance::evaluate(PointsIn points, Eigen::Ref<Vector> distances, con
       const double distance = std::sqrt(nearest[i].squared_distance) / hierarchy.factor();
       distances[block.rows[i]] = inside[i] ? -distance : distance;
     }
+    if (closest != nullptr) store_closest(hierarchy, block, nearest.data(), *closest);
   });
 }
 
@@ -186,21 +217,11 @@ void SignedDistance::unsigned_distance(PointsIn points, Eigen::Ref<Vector> dista
 ClosestPoints SignedDistance::closest(PointsIn points, const Progress& progress) const {
   const Hierarchy& hierarchy = parts_->hierarchy;
   require_usable(points, hierarchy);
-  ClosestPoints result{Points(points.rows(), 3), {}, Vector(points.rows())};
-  result.triangles.resize(points.rows());
+  ClosestPoints result = closest_points(points.rows());
   for_blocks(points, hierarchy, progress, [&](const Block& block) {
-    const HierarchyView view = hierarchy.view();
     std::array<Nearest, block_size> nearest;
-    run_nearest(view, block, nearest.data());
-    for (int i = 0; i < block.count; ++i) {
-      const TrianglePacket& packet = view.packets[nearest[i].packet];
-      const auto lane = std::find(packet.triangle, packet.triangle + tree_width, nearest[i].triangle);
-      const Vec3 query = Eigen::Map<const Vec3>(block.points.data() + 3 * i);
-      const Vec3 point = closest_point(packet, static_cast<int>(lane - packet.triangle), query);
-      result.points.row(block.rows[i]) = hierarchy.restored(point).transpose();
-      result.triangles[block.rows[i]] = nearest[i].triangle;
-      result.distances[block.rows[i]] = std::sqrt(nearest[i].squared_distance) / hierarchy.factor();
-    }
+    run_nearest(hierarchy.view(), block, nearest.data());
+    store_closest(hierarchy, block, nearest.data(), result);
   });
   return result;
 }

@@ -32,6 +32,9 @@ class ARAPFIELDS_EXPORT SignedDistance {
   /// coordinates that are not finite (or beyond 1e90 times the mesh's size), and use all threads in force.
   /// No result depends on the thread count or on the other points.
   void evaluate(PointsIn points, Eigen::Ref<Vector> distances, const Progress& progress = {}) const;
+  /// The same, and the closest points, found once.
+  ClosestPoints evaluate_closest(PointsIn points, Eigen::Ref<Vector> distances,
+                                 const Progress& progress = {}) const;
   void unsigned_distance(PointsIn points, Eigen::Ref<Vector> distances, const Progress& progress = {}) const;
   ClosestPoints closest(PointsIn points, const Progress& progress = {}) const;
   /// How often the soup winds around each point: 1 inside and 0 outside of a closed surface, fractions near
@@ -42,6 +45,8 @@ class ARAPFIELDS_EXPORT SignedDistance {
   bool is_closed() const;
 
  private:
+  void evaluate(PointsIn points, Eigen::Ref<Vector> distances, ClosestPoints* closest,
+                const Progress& progress) const;
   struct Parts;
   std::unique_ptr<const Parts> parts_;
 };

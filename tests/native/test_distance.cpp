@@ -104,7 +104,11 @@ BOOST_AUTO_TEST_CASE(hierarchy_equals_brute_force_exactly) {
 BOOST_AUTO_TEST_CASE(distances_and_closest_points_agree_with_textbook_formulas) {
   for (const TriangleMesh& mesh : {shapes::soup(90, 5), shapes::torus(20, 10)}) {
     const Points queries = shapes::queries(mesh, 600, 4);
-    const ClosestPoints closest = SignedDistance(mesh.vertices, mesh.triangles).closest(queries);
+    const SignedDistance distance(mesh.vertices, mesh.triangles);
+    const ClosestPoints closest = distance.closest(queries);
+    Vector alone(queries.rows()), both(queries.rows());
+    distance.evaluate(queries, alone);
+    BOOST_TEST((distance.evaluate_closest(queries, both).points == closest.points && alone == both));
     for (Index i = 0; i < queries.rows(); ++i) {
       const Vec3 q = queries.row(i).transpose(), c = closest.points.row(i).transpose();
       const double rounding = 1e-14 * (1 + q.norm());

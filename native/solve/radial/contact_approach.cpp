@@ -106,7 +106,7 @@ void ContactApproach::sweep(const std::vector<Mat4>& motions) {
 
 void ContactApproach::step(const std::vector<Mat4>& motions, Index iterations, Pull pull) {
   state_.objective(state_.fast);
-  set_reachable_targets(state_, motions, pull);
+  held_by_ = set_reachable_targets(state_, motions, pull);
   solve_round(RowMatrix<double>(state_.shape.coefficients), iterations);
 }
 
@@ -150,7 +150,7 @@ void ContactApproach::solve_to_targets(const std::vector<Mat4>& motions, bool to
   for (;;) {
     s.objective(s.fast);
     const PointsF places = to_its_end ? sample_places(s) : PointsF();
-    set_reachable_targets(s, motions);
+    held_by_ = set_reachable_targets(s, motions);
     const RowMatrix<double> here = s.shape.coefficients;
     if (start != nullptr && left == iterations_) *start = s.extrapolate();
     const Index at_once = std::clamp<Index>(left, least_at_once, in_a_round);

@@ -40,6 +40,8 @@ class ContactApproach {
   void step(const std::vector<Mat4>& motions, Index iterations, Pull pull = Pull::short_where_held);
   /// Number of steps in which handles move by this distance, in cube units.
   Index count(double distance, const Pace& pace) const;
+  /// The surfaces that held the handles back in the last solve.
+  const std::vector<Index>& held_by() const { return held_by_; }
   double length(const Pace& pace) const { return state_.contact.itself() ? pace.length_itself : pace.length; }
 
  private:
@@ -53,6 +55,7 @@ class ContactApproach {
   Index iterations_;
   double tolerance_;
   const Progress& progress_;
+  std::vector<Index> held_by_;
   bool swept_ = false;  // the last sweep took more than one step
 };
 

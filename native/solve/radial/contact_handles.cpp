@@ -20,7 +20,7 @@ constexpr double held_back = 0.02;
 
 std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
   std::vector<Index> by(motions.size(), -1);
-  if (motions.empty() || s.contact.found().planes.empty()) return by;
+  if (motions.empty() || !s.contact.has_planes()) return by;
   HandleBounds bounds(s, motions);
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const auto [translation, surface] = bounds.least_translation(static_cast<Index>(i));
@@ -30,7 +30,7 @@ std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
   return by;
 }
 
-void set_reachable_targets(RadialState& s, std::vector<Mat4> motions, Pull pull) {
+std::vector<Index> set_reachable_targets(RadialState& s, std::vector<Mat4> motions, Pull pull) {
   const std::vector<Index> by = hold_back(s, motions);
   Points targets = s.handles.targets_at(motions);
   RadialObjective<float>& objective = *s.fast.objective.latest();
@@ -49,32 +49,32 @@ void set_reachable_targets(RadialState& s, std::vector<Mat4> motions, Pull pull)
           values.middleRows(first, last - first) + longest_pull / length * left;
   }
   objective.set_targets(targets);
+  return by;
 }
 
-std::vector<HeldBack> held_back_handles(RadialState& s) {
+std::vector<HeldBack> held_back_handles(RadialState& s, const std::vector<Index>& by) {
   std::vector<HeldBack> result;
   const RadialObjective<float>& objective = s.objective(s.fast);  // with the planes of the last search
-  const Points places = contact_places(s);
   const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();
   const Points& targets = s.handles.pairs().targets;
   const Index own = s.handles.any() ? s.handles.own_count() : 0;
-  std::vector<Mat4> motions = motions_of(s.handles.bound());
-  const std::vector<Index> surfaces = hold_back(s, motions);
+  Points places;  // of the planes
   for (Index first = 0, last = 0; first < own; first = last) {
     const Index handle = s.handles.handle_of(first);
     while (last < own && s.handles.handle_of(last) == handle) ++last;
     const Points left = (targets - values).middleRows(first, last - first);
     const double distance = left.rowwise().norm().mean();
-    if (distance < held_back) continue;
+    if (distance < held_back || !s.contact.has_planes()) continue;
+    if (places.rows() == 0) places = contact_places(s);
     const Vec3 middle = values.middleRows(first, last - first).colwise().mean();
     const Vector along = s.contact.found().forces_at(middle, places.data(), s.contact.surface_count()) *
                          left.colwise().mean().transpose();
-    Index by = 0;
-    const bool pressed = along.minCoeff(&by) < 0.0;
-    const Index back = surfaces[static_cast<std::size_t>(handle)];
+    Index most = 0;
+    const bool pressed = along.minCoeff(&most) < 0.0;
+    const Index back = by[static_cast<std::size_t>(handle)];
     if (back >= 0 || pressed)
       result.push_back(
-          {handle, s.contact.name_of(back >= 0 ? back : by), s.problem.frame().scale * distance});
+          {handle, s.contact.name_of(back >= 0 ? back : most), s.problem.frame().scale * distance});
   }
   return result;
 }

@@ -13,9 +13,12 @@ std::vector<Index> hold_back(RadialState& state, std::vector<Mat4>& motions);
 /// How far handles are pulled with self-contact: to their targets, or a short way at a time, those that it
 /// holds back or all.
 enum class Pull { full, short_where_held, short_for_all };
-/// Sets the targets of the handles' springs to `motions`, held back by contact.
-void set_reachable_targets(RadialState& state, std::vector<Mat4> motions, Pull pull = Pull::short_where_held);
-/// The handles that contact keeps from their targets, and the surface that does it.
-std::vector<HeldBack> held_back_handles(RadialState& state);
+/// Sets the targets of the handles' springs to `motions`, held back by contact. Returns the surfaces of
+/// hold_back().
+std::vector<Index> set_reachable_targets(RadialState& state, std::vector<Mat4> motions,
+                                         Pull pull = Pull::short_where_held);
+/// The handles that contact keeps from their targets, and the surface that does it: of hold_back() (`by`), or
+/// the one that presses most.
+std::vector<HeldBack> held_back_handles(RadialState& state, const std::vector<Index>& by);
 
 }  // namespace arapfields

@@ -20,12 +20,12 @@ constexpr int most_pulls = 3;
 constexpr double better = 0.01;
 
 /// Fills the report's part on contact.
-void report_contact(RadialState& s) {
+void report_contact(RadialState& s, const std::vector<Index>& held_by) {
   const double depth = s.contact.deepest();
   s.report.contact = {s.problem.frame().scale * depth,
                       s.contact.found().contact_area(),
                       depth > ContactSet::deep,
-                      held_back_handles(s),
+                      held_back_handles(s, held_by),
                       {}};
 }
 
@@ -150,7 +150,7 @@ bool ContactSolve::escapes_local_minimum() {
     if (!s.contact.overlaps(s.shape.coefficients)) return true;
   } else if (rests && s.contact.deepest_outside() <= 0.0) {
     steps_.approach_at_once(motions_);
-    report_contact(s);
+    report_contact(s, steps_.held_by());
     if (!s.contact.overlaps(s.shape.coefficients) && value_without_contact(s) < (1.0 - better) * value)
       return true;
   }
@@ -185,7 +185,7 @@ bool ContactSolve::separates_parts(int most_solves) {
     steps_.approach_at_once(motions_);
     apart = !state_.contact.overlaps(state_.shape.coefficients);
   }
-  if (apart) report_contact(state_);
+  if (apart) report_contact(state_, steps_.held_by());
   return apart;
 }
 
@@ -203,7 +203,7 @@ void ContactSolve::approach(bool slowly) {
   slowly = slowly || (state_.in_one_go && is_inside());
   if (slowly && longest_motion() > steps_.length(ContactApproach::small)) approach_again_slowly(start);
   if (slowly && state_.contact.overlaps(state_.shape.coefficients)) approach_while_apart(start);
-  report_contact(state_);
+  report_contact(state_, steps_.held_by());
 }
 
 /// Continuation in small steps that ends where the next one would put a part into another or press it flat,

@@ -15,7 +15,7 @@
 namespace arapfields {
 namespace {
 
-/// Most sweeps of Hildreth's method, and its tolerance, in cube units.
+/// Most sweeps of Hildreth's method for each set, and the tolerance of bounds, in cube units.
 constexpr int most_sweeps = 200;
 constexpr double settled = 1e-6;
 /// A contact point is under a point handle if it is no farther from it than `under` at rest, nor than `aside`
@@ -173,18 +173,30 @@ void HandleBounds::bind_to_itself(const ContactPlane& plane, const Vec3& normal,
   bounds_of(second.holder).push_back({-normal, (1.0 - own) * depth, plane.obstacle});
 }
 
-/// The least translation within bounds, a quadratic program, by Hildreth's method (1957).
+/// The least translation within bounds, a quadratic program: Hildreth's method (1957) for a growing set of
+/// bounds, to which the most violated one is added until none is violated.
 std::pair<Vec3, Index> HandleBounds::solve(const std::vector<Bound>& bounds) {
   Vec3 translation = Vec3::Zero();
   std::vector<double> multipliers(bounds.size(), 0.0);
-  double change = settled;
-  for (int sweep = 0; sweep < most_sweeps && change >= settled; ++sweep) {
-    change = 0.0;
-    for (std::size_t k = 0; k < bounds.size(); ++k) {
-      const double next = std::max(0.0, multipliers[k] + bounds[k].depth - bounds[k].normal.dot(translation));
-      translation += (next - multipliers[k]) * bounds[k].normal;
-      change = std::max(change, std::abs(next - multipliers[k]));
-      multipliers[k] = next;
+  std::vector<std::size_t> active;
+  for (;;) {
+    double most = settled;
+    std::size_t worst = bounds.size();
+    for (std::size_t k = 0; k < bounds.size(); ++k)
+      if (const double depth = bounds[k].depth - bounds[k].normal.dot(translation); depth > most)
+        most = depth, worst = k;
+    if (worst == bounds.size() || std::find(active.begin(), active.end(), worst) != active.end()) break;
+    active.push_back(worst);
+    double change = settled;
+    for (int sweep = 0; sweep < most_sweeps && change >= settled; ++sweep) {
+      change = 0.0;
+      for (const std::size_t k : active) {
+        const double next =
+            std::max(0.0, multipliers[k] + bounds[k].depth - bounds[k].normal.dot(translation));
+        translation += (next - multipliers[k]) * bounds[k].normal;
+        change = std::max(change, std::abs(next - multipliers[k]));
+        multipliers[k] = next;
+      }
     }
   }
   const auto most = std::max_element(multipliers.begin(), multipliers.end());
@@ -196,13 +208,15 @@ std::pair<Vec3, Index> HandleBounds::solve(const std::vector<Bound>& bounds) {
 /// Linearises the bounds of curved solids anew at the translated points. Returns whether any was changed.
 bool HandleBounds::linearise_anew(std::vector<Bound>& bounds, const Vec3& translation) const {
   const RadialState& s = state_;
+  const double length = translation.norm();  // no point comes nearer by more
   bool any = false;
   for (Index k = 0; k < std::ssize(s.contact.surfaces()); ++k) {
     const BarrierSurface& surface = s.contact.surfaces()[static_cast<std::size_t>(k)];
     if (surface.is_ground() || surface.is_sheet()) continue;
     std::vector<Bound*> of;
     for (Bound& bound : bounds)
-      if (bound.surface == k && bound.target && bound.normal.dot(translation) - bound.depth < near_bound)
+      if (bound.surface == k && bound.target && bound.depth > -length &&
+          bound.normal.dot(translation) - bound.depth < near_bound)
         of.push_back(&bound);
     if (of.empty()) continue;
     Points places(std::ssize(of), 3);
