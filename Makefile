@@ -12,10 +12,10 @@ SOURCES := $(shell find native cmake -type f) CMakeLists.txt pyproject.toml
 PIP := $(PY) -m pip install --disable-pip-version-check
 PYTEST := $(PY) -m pytest
 # Files of tests are dealt out, long ones first, to as many processes as there are processors; each needs memory.
-# There, a thread of libtorch's that waits must not hold the processor that another process needs.
+# There, a thread of libtorch's or numpy's that waits must not hold the processor that another process needs.
 # Compiled Python is kept, also where it is told to keep none: each Blender would compile the extension again.
 BYTECODE := PYTHONDONTWRITEBYTECODE= PYTHONPYCACHEPREFIX=$(abspath build/bytecode)
-ALL_TESTS := OMP_WAIT_POLICY=passive $(BYTECODE) $(PYTEST) -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+ALL_TESTS := OMP_WAIT_POLICY=passive OPENBLAS_NUM_THREADS=1 $(BYTECODE) $(PYTEST) -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 # BACKEND=eigen: the library without libtorch, as wheels and zips have it, in a folder of its own beside .venv's.
 BACKEND := torch
 TORCH := $(VENV)/.torch
