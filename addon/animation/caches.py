@@ -64,7 +64,7 @@ class CacheFile:
 
     def __init__(self, path, frames, fps):
         self.path, self.frames, self._fps = path, frames, fps
-        self._writer = None
+        self._writer, self._makes_folder = None, not path.parent.exists()
 
     def discard_item(self):
         """Does nothing: there is no temporary object."""
@@ -77,6 +77,7 @@ class CacheFile:
         from arapfields.point_cache import PointCacheWriter
 
         frames, times = self.frames, {"start": self.frames.start, "step": self.frames.step, "fps": self._fps}
+        self.path.parent.mkdir(exist_ok=True)
         self._writer = PointCacheWriter(self.path, points, frames.count, **times)
 
     def add(self, points):
@@ -93,9 +94,12 @@ class CacheFile:
             raise as_user_error(error) from error
 
     def discard(self):
-        """Removes an uncommitted cache; that of an earlier bake stays."""
+        """Removes an uncommitted cache and its new folder; a cache of an earlier bake stays."""
         if self._writer is not None:
             self._writer.discard()
+        if self._makes_folder:
+            with contextlib.suppress(OSError):  # others are in it
+                self.path.parent.rmdir()
 
     def play_on(self, item):
         """Adds the modifier that plays the cache to an object."""
@@ -103,7 +107,7 @@ class CacheFile:
 
 
 def cache_path(source, suffix, folder, filepath=""):
-    """The absolute path of an object's cache; UserError if it cannot be used."""
+    """The absolute path of an object's cache, whose folder may be new; UserError if it cannot be used."""
     name = BARRED.sub("_", source.name)
     shown = filepath or f"{folder.rstrip('/') or '/'}/{name}{suffix}"
     if shown.startswith("//") and not bpy.data.filepath:
@@ -111,10 +115,9 @@ def cache_path(source, suffix, folder, filepath=""):
     path = Path(bpy.path.abspath(shown))
     if path.suffix.lower() != suffix:
         raise UserError("{path}: the format needs the extension {suffix}", path=path, suffix=suffix)
-    try:
-        path.parent.mkdir(exist_ok=True)
-    except (FileNotFoundError, FileExistsError, NotADirectoryError):
-        raise UserError("{folder}: no such folder", folder=path.parent) from None
+    folder = path.parent
+    if not folder.is_dir() and (folder.exists() or not folder.parent.is_dir()):
+        raise UserError("{folder}: no such folder", folder=folder)
     return path
 
 

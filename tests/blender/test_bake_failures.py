@@ -43,6 +43,16 @@ def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
     fails("Nothing that moves Bar is animated", range="HANDLES")
 
 
+@pytest.mark.parametrize("stage", ["frame 1", "frame 3"])
+def test_a_cancelled_bake_leaves_no_folder_of_its_own(stage):
+    _, folder = saved_animation()
+    assert cancelled_at(stepped(format="PC2", start=1, end=5, folder="//cache"), stage) == {"CANCELLED"}
+    assert not (folder / "cache").exists()
+    (folder / "cache").mkdir()  # the user's
+    assert cancelled_at(stepped(format="PC2", start=1, end=5, folder="//cache"), stage) == {"CANCELLED"}
+    assert os.listdir(folder / "cache") == []
+
+
 def test_modifiers_that_make_other_vertices_as_frames_pass_are_named():
     bar = animated()
     subdivision = bar.modifiers.new("Subdivision", "SUBSURF")
