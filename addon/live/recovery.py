@@ -108,7 +108,7 @@ def adopt(source):
         live_object.forget(source)
         item.name = item.data.name = f"{source.name}{RESULT_SUFFIX[kind]}"
         result_objects.register(source, kind, settings.output, item)
-    elif not is_moved(source):
+    elif not in_scene(source) or not is_moved(source):
         return
     text = translated("it was live when the file was saved; its shape is kept as a result")
     jobs.add_message("INFO", f"{source.name}: {text}")

@@ -156,6 +156,22 @@ def test_a_file_saved_while_live_shows_the_same_shape_as_a_result(target):
     assert not jobs.messages()
 
 
+def test_a_file_saved_after_the_live_object_was_deleted_tells_nothing_of_it():
+    """Its handles keep it in the file."""
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.ops.arapfields.live()
+    moving.location.z += 0.4
+    step()
+    scenes.activate(bar)
+    bpy.ops.object.delete()
+    step()
+    path = tempfile.mktemp(suffix=".blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert "Bar" in bpy.data.objects and not bpy.data.objects["Bar"].arapfields.live_kind
+    assert not jobs.messages()
+
+
 def test_what_cannot_be_live_is_named():
     scenes.bar()
     with pytest.raises(RuntimeError, match="Bar has no handle"):
