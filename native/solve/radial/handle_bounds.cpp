@@ -15,7 +15,9 @@
 namespace arapfields {
 namespace {
 
-/// Most sweeps of Hildreth's method for each set, and the tolerance of bounds, in cube units.
+/// Most bounds in a set (no translation may fulfil all), most sweeps of Hildreth's method for each set, and
+/// the tolerance of bounds, in cube units.
+constexpr std::size_t most_active = 40;
 constexpr int most_sweeps = 200;
 constexpr double settled = 1e-6;
 /// A contact point is under a point handle if it is no farther from it than `under` at rest, nor than `aside`
@@ -185,7 +187,9 @@ std::pair<Vec3, Index> HandleBounds::solve(const std::vector<Bound>& bounds) {
     for (std::size_t k = 0; k < bounds.size(); ++k)
       if (const double depth = bounds[k].depth - bounds[k].normal.dot(translation); depth > most)
         most = depth, worst = k;
-    if (worst == bounds.size() || std::find(active.begin(), active.end(), worst) != active.end()) break;
+    if (worst == bounds.size() || active.size() == most_active ||
+        std::find(active.begin(), active.end(), worst) != active.end())
+      break;
     active.push_back(worst);
     double change = settled;
     for (int sweep = 0; sweep < most_sweeps && change >= settled; ++sweep) {
