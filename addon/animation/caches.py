@@ -59,12 +59,28 @@ class ShapeKeys:
                 result_objects.discard(self.item)
 
 
+class OutputFolder:
+    """A folder that may be new: made when it is needed, and removed if nothing is written to it."""
+
+    def __init__(self, path):
+        self.path, self._is_new = path, not path.exists()
+
+    def make(self):
+        self.path.mkdir(exist_ok=True)
+
+    def remove_if_unused(self):
+        """Removes the folder if it is new and empty."""
+        if self._is_new:
+            with contextlib.suppress(OSError):  # it is not empty, or was never made
+                self.path.rmdir()
+
+
 class CacheFile:
     """The frames of one object in a point cache file, which `commit` moves to its final path."""
 
     def __init__(self, path, frames, fps):
         self.path, self.frames, self._fps = path, frames, fps
-        self._writer, self._makes_folder = None, not path.parent.exists()
+        self._writer, self._folder = None, OutputFolder(path.parent)
 
     def discard_item(self):
         """Does nothing: there is no temporary object."""
@@ -77,7 +93,7 @@ class CacheFile:
         from arapfields.point_cache import PointCacheWriter
 
         frames, times = self.frames, {"start": self.frames.start, "step": self.frames.step, "fps": self._fps}
-        self.path.parent.mkdir(exist_ok=True)
+        self._folder.make()
         self._writer = PointCacheWriter(self.path, points, frames.count, **times)
 
     def add(self, points):
@@ -97,9 +113,7 @@ class CacheFile:
         """Removes an uncommitted cache and its new folder; a cache of an earlier bake stays."""
         if self._writer is not None:
             self._writer.discard()
-        if self._makes_folder:
-            with contextlib.suppress(OSError):  # others are in it
-                self.path.parent.rmdir()
+        self._folder.remove_if_unused()
 
     def play_on(self, item):
         """Adds the modifier that plays the cache to an object."""

@@ -31,7 +31,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
     bl_options = set()
     title = "Export"
     folder = None  # of the caches that are played while the exporter runs
-    new_folder = None  # of the file, if it was not there before
+    output_folder = None  # of the file
     guide = "animation"
 
     __annotations__ = {
@@ -101,8 +101,8 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         return False
 
     def plan(self, context, job, path, unsolved):
-        self.new_folder = None if path.parent.exists() else path.parent
-        path.parent.mkdir(exist_ok=True)
+        self.output_folder = caches.OutputFolder(path.parent)
+        self.output_folder.make()
         names = ", ".join(reference.name for reference in self.items)
         if not unsolved:
             return [Item(names, lambda _: None, lambda _: self.export(context, job, path))]
@@ -153,9 +153,8 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         super().clear_up(job)
         if self.folder is not None:
             shutil.rmtree(self.folder, ignore_errors=True)
-        if self.new_folder is not None:
-            with contextlib.suppress(OSError):  # the export is in it
-                self.new_folder.rmdir()
+        if self.output_folder is not None:
+            self.output_folder.remove_if_unused()
 
 
 class ARAPFIELDS_MT_export(bpy.types.Menu):

@@ -29,7 +29,7 @@ class SharedCache(CacheFile):
         if region is not None:
             content += region.tobytes()
         self._points = len(solver.rest)
-        self.path.parent.mkdir(exist_ok=True)
+        self._folder.make()
         self._store = FrameStore(self.path, self._points, content)
 
     def add_request(self, solver, request):
