@@ -15,6 +15,7 @@ if IN_BLENDER:
     from addon.animation import bake_operator, export_operators, exporters, operators
     from addon.animation.properties import ARAPFIELDS_PG_bake
     from addon.blender import property_definitions
+    from addon.core.errors import UserError
 
 pytestmark = pytest.mark.in_blender
 
@@ -29,6 +30,22 @@ def test_a_folder_is_made_where_its_parent_exists():
     folder = five_frames()
     bpy.ops.arapfields.export_animation(format="GLTF", filepath="//new/a.glb")
     assert [path.name for path in (folder / "new").iterdir()] == ["a.glb"]
+
+
+def test_an_export_that_fails_leaves_no_new_folder():
+    folder, write = five_frames(), exporters.write
+
+    def fails(*_):
+        raise UserError("The exporter failed")
+        yield  # as a coroutine, like the real one
+
+    exporters.write = fails
+    try:
+        with pytest.raises(RuntimeError, match="The exporter failed"):
+            bpy.ops.arapfields.export_animation(format="GLTF", filepath="//new/a.glb")
+    finally:
+        exporters.write = write
+    assert not (folder / "new").exists()
 
 
 def test_a_format_that_this_blender_lacks_is_greyed_and_says_so():
