@@ -38,23 +38,58 @@ FacingRuns::FacingRuns(RowMatrix<double> rest, double far)
   };
   split(split, 0, rest.rows());
   rest = rest(order_, Eigen::all).eval();
-  const RowBoxes<8> boxes(rest);
-  for (Index level = 0; level < boxes.levels(); ++level) {
-    std::vector<Ball>& balls = balls_.emplace_back(static_cast<std::size_t>(boxes.count(level)));
-    const Index rows = run << level;
-    for (Index k = 0; k < std::ssize(balls); ++k) {
-      Ball& ball = balls[static_cast<std::size_t>(k)];
-      ball.middle = 0.5f * (boxes.box(level, k).low + boxes.box(level, k).high);
-      const auto members = rest.middleRows(k * rows, std::min(rows, rest.rows() - k * rows));
-      const Eigen::RowVectorXd middle = ball.middle.matrix().transpose().cast<double>();
-      const double radius = std::sqrt((members.rowwise() - middle).rowwise().squaredNorm().maxCoeff());
-      ball.left = static_cast<float>(0.5 * (1.0 - rounding) * far - radius);
-    }
+  for (Index nodes = count(), rows = run; nodes > 0; rows *= 4) {  // children of this many rows
+    nodes = (nodes + 3) / 4;
+    std::vector<Balls>& balls = balls_.emplace_back();
+    for (Index k = 0; k < nodes; ++k) balls.push_back(balls_of(rest, k, rows, far));
+    if (nodes == 1) break;
   }
   rest_.resize(static_cast<std::size_t>(count()));
   for (Index i = 0; i < rest.rows(); ++i)
     for (Index c = 0; c < rest.cols(); ++c)
       rest_[static_cast<std::size_t>(i / run)].at[c][i % run] = static_cast<float>(rest(i, c));
+}
+
+/// The balls around the rest coordinates of a node's children, which have so many rows each.
+FacingRuns::Balls FacingRuns::balls_of(const RowMatrix<double>& rest, Index parent, Index rows,
+                                       double far) const {
+  Balls balls;
+  for (Lanes& lanes : balls.middle) lanes.setZero();
+  balls.left.setZero();
+  for (Index child = 0; child < 4; ++child) {
+    const Index first = (4 * parent + child) * rows, size = std::min(rows, rest.rows() - first);
+    if (size <= 0) break;
+    const auto members = rest.middleRows(first, size);
+    const Eigen::RowVectorXd middle = 0.5 * (members.colwise().minCoeff() + members.colwise().maxCoeff());
+    const double radius = std::sqrt((members.rowwise() - middle).rowwise().squaredNorm().maxCoeff());
+    for (Index c = 0; c < 8; ++c) balls.middle[c][child] = static_cast<float>(middle[c]);
+    balls.left[child] = static_cast<float>(0.5 * (1.0 - rounding) * far - radius);
+  }
+  return balls;
+}
+
+/// The boxes around the open samples of the nodes' children, for each level.
+std::vector<std::vector<FacingRuns::Boxes>> FacingRuns::boxes_of(const std::vector<Now>& now) const {
+  Boxes empty;
+  for (int c = 0; c < 3; ++c) {
+    empty.low[c] = Lanes::Constant(nowhere);
+    empty.high[c] = -empty.low[c];
+  }
+  std::vector<std::vector<Boxes>> boxes;
+  for (const std::vector<Balls>& level : balls_) boxes.emplace_back(level.size(), empty);
+  for (std::size_t k = 0; k < now.size(); ++k)
+    for (int c = 0; c < 3; ++c) {
+      const Lanes& at = now[k].at[c];
+      boxes[0][k / 4].low[c][static_cast<Index>(k % 4)] = at.minCoeff();
+      boxes[0][k / 4].high[c][static_cast<Index>(k % 4)] = (at == nowhere).select(-nowhere, at).maxCoeff();
+    }
+  for (std::size_t level = 1; level < boxes.size(); ++level)
+    for (std::size_t k = 0; k < boxes[level - 1].size(); ++k)
+      for (int c = 0; c < 3; ++c) {
+        boxes[level][k / 4].low[c][static_cast<Index>(k % 4)] = boxes[level - 1][k].low[c].minCoeff();
+        boxes[level][k / 4].high[c][static_cast<Index>(k % 4)] = boxes[level - 1][k].high[c].maxCoeff();
+      }
+  return boxes;
 }
 
 bool FacingRuns::meet(const Rest& rest_a, const Rest& rest_b, const Now& a, const Now& b,
@@ -77,9 +112,7 @@ bool FacingRuns::meet(const Rest& rest_a, const Rest& rest_b, const Now& a, cons
 std::vector<std::vector<Index>> FacingRuns::meeting(PointsIn places, const Points& normals,
                                                     const Eigen::Array<bool, Eigen::Dynamic, 1>& open,
                                                     double near, double facing) const {
-  const RowBoxes<4> boxes(rows_of(places, order_));
   const bool known = normals.rows() > 0;
-  const RowBoxes<4> sides(known ? rows_of(normals, order_) : Points(0, 3));
   Now none;
   for (Lanes& lanes : none.at) lanes = Lanes::Constant(nowhere);
   for (Lanes& lanes : none.normal) lanes = Lanes::Zero();
@@ -95,25 +128,34 @@ std::vector<std::vector<Index>> FacingRuns::meeting(PointsIn places, const Point
   }
   const Limits limits{(1.0f + rounding) * static_cast<float>(near * near),
                       known ? static_cast<float>(facing) + rounding : 1.0f, far_};
+  const std::vector<std::vector<Boxes>> boxes = boxes_of(now);
   std::vector<std::vector<Index>> result(now.size());
-  const auto descend = [&](const auto& self, Index level, Index a, Index b) -> void {
-    if (boxes.box(level, a).gap(boxes.box(level, b)) > limits.near) return;
-    if (known && sides.box(level, a).least_product(sides.box(level, b)) > limits.facing) return;
-    const std::vector<Ball>& balls = balls_[static_cast<std::size_t>(level)];
-    const Ball &first = balls[static_cast<std::size_t>(a)], &second = balls[static_cast<std::size_t>(b)];
-    const float left = first.left + second.left;
-    if (left > 0.0f && (first.middle - second.middle).square().sum() < left * left) return;
-    const auto x = static_cast<std::size_t>(a), y = static_cast<std::size_t>(b);
-    if (level > 0) {
-      const Index below = boxes.count(level - 1);
-      for (Index i = 2 * a; i < std::min(2 * a + 2, below); ++i)
-        for (Index j = a == b ? i : 2 * b; j < std::min(2 * b + 2, below); ++j) self(self, level - 1, i, j);
-    } else if (meet(rest_[x], rest_[y], now[x], now[y], limits)) {
-      result[x].push_back(b);
-      if (a != b) result[y].push_back(a);
+  const auto pair = [&](std::size_t a, std::size_t b) {
+    if (!meet(rest_[a], rest_[b], now[a], now[b], limits)) return;
+    result[a].push_back(static_cast<Index>(b));
+    if (a != b) result[b].push_back(static_cast<Index>(a));
+  };
+  const auto descend = [&](const auto& self, std::size_t level, std::size_t a, std::size_t b) -> void {
+    const Boxes &box = boxes[level][a], &others = boxes[level][b];
+    const Balls &ball = balls_[level][a], &beside = balls_[level][b];
+    for (Index i = 0; i < 4; ++i) {
+      Lanes gap = Lanes::Zero(), apart = Lanes::Zero();
+      for (int c = 0; c < 3; ++c)
+        gap += (box.low[c][i] - others.high[c]).max(others.low[c] - box.high[c][i]).max(0.0f).square();
+      if (gap.minCoeff() > limits.near) continue;
+      for (int c = 0; c < 8; ++c) apart += (beside.middle[c] - ball.middle[c][i]).square();
+      const Lanes left = (beside.left + ball.left[i]).max(0.0f).square();
+      for (Index j = a == b ? i : 0; j < 4; ++j) {
+        if (gap[j] > limits.near || apart[j] < left[j]) continue;
+        const std::size_t x = 4 * a + static_cast<std::size_t>(i), y = 4 * b + static_cast<std::size_t>(j);
+        if (level > 0)
+          self(self, level - 1, x, y);
+        else
+          pair(x, y);
+      }
     }
   };
-  descend(descend, boxes.levels() - 1, 0, 0);
+  if (!boxes.empty()) descend(descend, boxes.size() - 1, 0, 0);
   return result;
 }
 

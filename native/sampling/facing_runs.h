@@ -5,15 +5,15 @@
 #include <vector>
 
 #include "core/export.h"
-#include "sampling/row_boxes.h"
+#include "core/types.h"
 
 namespace arapfields {
 
-/// A broad phase for self-contact: groups (runs) of samples that are compact at rest, and the search for
-/// pairs of runs whose samples face each other in a deformed shape.
+/// A broad phase for self-contact: runs of samples that are compact at rest, in a hierarchy of four children
+/// a node, and the search for pairs of runs whose samples face each other in a deformed shape.
 class ARAPFIELDS_EXPORT_TO_TESTS FacingRuns {
  public:
-  static constexpr Index run = RowBoxes<4>::run;
+  static constexpr Index run = 4;
   /// For rest coordinates of samples (n,8). Pairs whose rows have a distance below `far` are excluded.
   FacingRuns(RowMatrix<double> rest, double far);
   Index count() const { return (std::ssize(order_) + run - 1) / run; }
@@ -28,7 +28,7 @@ class ARAPFIELDS_EXPORT_TO_TESTS FacingRuns {
                                           double facing) const;
 
  private:
-  using Lanes = Eigen::Array<float, run, 1>;  // one for each sample of a run
+  using Lanes = Eigen::Array<float, 4, 1>;  // one for each sample of a run, or each child of a node
   struct Rest {
     Lanes at[8];
   };
@@ -36,9 +36,13 @@ class ARAPFIELDS_EXPORT_TO_TESTS FacingRuns {
     Lanes at[3];
     Lanes normal[3];
   };
-  struct Ball {
-    Eigen::Array<float, 8, 1> middle;
-    float left;  // half of `far` minus the radius
+  struct Balls {
+    Lanes middle[8];
+    Lanes left;  // half of `far` minus the radius
+  };
+  struct Boxes {
+    Lanes low[3];
+    Lanes high[3];
   };
   struct Limits {
     float near;  // squared
@@ -46,9 +50,12 @@ class ARAPFIELDS_EXPORT_TO_TESTS FacingRuns {
     float far;  // squared
   };
   static bool meet(const Rest& rest_a, const Rest& rest_b, const Now& a, const Now& b, const Limits& limits);
+  Balls balls_of(const RowMatrix<double>& rest, Index parent, Index rows, double far) const;
+  std::vector<std::vector<Boxes>> boxes_of(const std::vector<Now>& now) const;
 
-  std::vector<Index> order_;              // spatial order of the samples at rest
-  std::vector<std::vector<Ball>> balls_;  // at rest, for each level of boxes
+  std::vector<Index> order_;  // spatial order of the samples at rest
+  std::vector<std::vector<Balls>>
+      balls_;  // at rest, of the nodes of each level; runs are children at level 0
   std::vector<Rest> rest_;
   float far_;
 };

@@ -9,7 +9,6 @@
 #include "fields/radial_evaluator.h"
 #include "optimize/quasi_newton.h"
 #include "sampling/facing_runs.h"
-#include "sampling/row_boxes.h"
 #include "tensors/dense.h"
 
 using namespace arapfields;
@@ -101,47 +100,55 @@ BOOST_AUTO_TEST_CASE(evaluators_agree_with_their_rows_and_pull_back_is_the_trans
   check_evaluator<float>(1e-5);
 }
 
-BOOST_AUTO_TEST_CASE(boxes_of_runs_bound_the_distances_of_their_rows) {
-  const Points points = random_points(77, 13);
-  const RowBoxes<4> boxes(points);
-  BOOST_TEST(boxes.count(boxes.levels() - 1) == 1);
-  for (Index level = 0; level < boxes.levels(); ++level)
-    for (Index i = 0; i < points.rows(); ++i)
-      for (Index j = 0; j < points.rows(); ++j) {
-        const Index a = i / boxes.run >> level, b = j / boxes.run >> level;
-        const double square = (points.row(i) - points.row(j)).squaredNorm();
-        BOOST_TEST(boxes.box(level, a).gap(boxes.box(level, b)) <= square + 1e-5);
-        BOOST_TEST(boxes.box(level, a).least_product(boxes.box(level, b)) <=
-                   points.row(i).dot(points.row(j)) + 1e-5);
-      }
-}
+/// Relative width of the band around the limits in which rounding may decide.
+constexpr double band = 1e-3;
 
-BOOST_AUTO_TEST_CASE(runs_meet_where_their_samples_do) {
-  const Index n = 78;
-  const double far = 3.0, near = 0.4, facing = -0.1;
-  const RowMatrix<double> rest = random_matrix(n, 8, 14);
+/// `like`: rest coordinates are the places themselves, so that runs are compact in both.
+void check_runs(Index n, bool like, double far) {
+  const double near = 0.4, facing = -0.1;
   const Points places = random_points(n, 15);
+  RowMatrix<double> rest = random_matrix(n, 8, 14);
+  if (like) {
+    rest.setZero();
+    rest.leftCols(3) = places;
+  }
   const Points known = Points(random_matrix(n, 3, 16)).rowwise().normalized();
   Eigen::Array<bool, Eigen::Dynamic, 1> open(n);
   for (Index i = 0; i < n; ++i) open[i] = i % 5 != 0;
   const FacingRuns runs(rest, far);
   for (const Points& normals : {Points(0, 3), known}) {
     const auto met = runs.meeting(places, normals, open, near, facing);
-    Index found = 0;
+    Index found = 0, wrong = 0;
     for (Index a = 0; a < runs.count(); ++a)
       for (Index b = 0; b < runs.count(); ++b) {
-        bool meets = false;
+        bool meets = false, may_meet = false;  // within the limits, and within slightly wider ones
         for (const Index i : runs.samples(a))
-          for (const Index j : runs.samples(b))
-            meets = meets || (open[i] && open[j] && (places.row(i) - places.row(j)).norm() < near &&
-                              (rest.row(i) - rest.row(j)).norm() > far &&
-                              (normals.rows() == 0 || normals.row(i).dot(normals.row(j)) <= facing));
+          for (const Index j : runs.samples(b)) {
+            const double gap = (places.row(i) - places.row(j)).norm();
+            const double apart = (rest.row(i) - rest.row(j)).norm();
+            const double cosine = normals.rows() == 0 ? -1.0 : normals.row(i).dot(normals.row(j));
+            const auto within = [&](double by) {
+              return open[i] && open[j] && gap < (1.0 + by) * near && apart > (1.0 - by) * far &&
+                     cosine <= facing + by;
+            };
+            meets = meets || within(0.0);
+            may_meet = may_meet || within(band);
+          }
         const auto& of = met[static_cast<std::size_t>(a)];
-        BOOST_TEST((std::count(of.begin(), of.end(), b) == (meets ? 1 : 0)));
+        const auto times = std::count(of.begin(), of.end(), b);
+        wrong += times > (may_meet ? 1 : 0) || times < (meets ? 1 : 0);
         found += meets;
       }
-    BOOST_TEST(found > 0);
+    BOOST_TEST(wrong == 0);
+    BOOST_TEST((found > 0 || n < 10));
     BOOST_TEST(found < runs.count() * runs.count());
+  }
+}
+
+BOOST_AUTO_TEST_CASE(runs_meet_where_their_samples_do) {
+  for (const Index n : {1, 14, 78, 600}) {
+    check_runs(n, false, 3.0);
+    check_runs(n, true, 0.2);
   }
 }
 

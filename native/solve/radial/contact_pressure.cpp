@@ -30,22 +30,22 @@ double nearness(const double* places, Index row, const Vec3& place) {
 
 /// Collects the points of the planes, once each, and lets the planes index them.
 void ContactTerms::gather_places() {
-  std::vector<Index>& used = found_.rows;
-  used.clear();
-  for (const ContactPlane& plane : found_.planes) {
-    used.push_back(plane.first);
-    if (plane.second >= 0) used.push_back(plane.second);
+  std::vector<Index> place(static_cast<std::size_t>(points_.size()), -1);
+  const auto of = [&](Index row) -> Index& { return place[static_cast<std::size_t>(row)]; };
+  for (const ContactPlane& plane : found_.planes)
+    for (const Index row : {plane.first, plane.second})
+      if (row >= 0) of(row) = 0;
+  found_.rows.clear();
+  for (Index row = 0; row < points_.size(); ++row) {
+    if (of(row) < 0) continue;
+    of(row) = std::ssize(found_.rows);
+    found_.rows.push_back(row);
   }
-  std::sort(used.begin(), used.end());
-  used.erase(std::unique(used.begin(), used.end()), used.end());
-  found_.places = points_.rest(used);
-  found_.embedded = points_.embedded(used);
-  const auto row_of = [&](Index row) {
-    return std::lower_bound(used.begin(), used.end(), row) - used.begin();
-  };
+  found_.places = points_.rest(found_.rows);
+  found_.embedded = points_.embedded(found_.rows);
   for (ContactPlane& plane : found_.planes) {
-    plane.first = row_of(plane.first);
-    if (plane.second >= 0) plane.second = row_of(plane.second);
+    plane.first = of(plane.first);
+    if (plane.second >= 0) plane.second = of(plane.second);
   }
   found_.revision = found_.planes.empty() ? 0 : ++sets_;
 }

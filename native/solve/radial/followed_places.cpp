@@ -15,7 +15,7 @@ namespace arapfields {
 namespace {
 
 /// Most contact samples; they are denser than any detail of a radial field.
-constexpr Index most_samples = 20000;
+constexpr Index most_samples = 14000;
 /// Mesh vertices farther than this from the samples' surface, in cube units, become contact points; nearer
 /// ones are within the safety distance of contact.
 constexpr double stands_out = 1e-3;

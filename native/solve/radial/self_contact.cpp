@@ -192,10 +192,9 @@ Index SelfContact::faced_by(Index i, const std::vector<Index>& runs, PointsIn pl
       const double square = arm.squaredNorm();
       if (square >= nearest) continue;
       const Vec3 other = normals.row(j).transpose();
-      if (normal.dot(other) > facing || !may_meet(i, j)) continue;
       const double gap = arm.dot(other);
-      if (square - gap * gap > most_offset_ * most_offset_ || -gap > std::min(widths_[i], widths_[j]))
-        continue;
+      if (normal.dot(other) > facing || square - gap * gap > most_offset_ * most_offset_) continue;
+      if (-gap > std::min(widths_[i], widths_[j]) || !may_meet(i, j)) continue;
       if (!is_gap(gap, i, j, other, penetrations)) continue;
       nearest = square;
       faced = j;
