@@ -17,7 +17,7 @@ from ..core.runtime import jobs
 from ..field_modifier import layers, motion
 from ..handles import empties, naming
 from ..live import sessions
-from ..results import placement
+from ..results import placement, visibility
 from . import places
 
 REACH_STEP = 1.1  # factor of a handle's reach per step of the mouse wheel
@@ -47,10 +47,12 @@ def is_own(item):
 
 
 def handles_in_view(context):
-    """[(source, entry)] of all visible handles with Empties."""
+    """[(source, entry)] of the visible handles with Empties of objects of which something is visible."""
     handles = []
     for source in context.view_layer.objects:
-        if settings_of(source).handles and object_references.is_source(source):
+        if not settings_of(source).handles or not object_references.is_source(source):
+            continue
+        if any(shape.visible_get() for shape in visibility.family(source)):
             entries = [entry for entry in empties.used(source) if entry.kind != "BONE"]
             handles += [(source, entry) for entry in entries if entry.empty.visible_get()]
     return handles

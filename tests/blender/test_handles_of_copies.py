@@ -62,3 +62,14 @@ def test_a_copy_that_is_left_has_the_handles():
     bar, copied, empty = posed_and_copied(linked=False)
     bpy.data.objects.remove(bar)
     assert [entry.empty for entry in empties.used(copied)] == [empty]
+
+
+def test_handles_of_a_hidden_object_are_not_in_view():
+    bar, copied, empty = posed_and_copied(linked=False)
+    own = pin(copied, (-1.0, 3.0, 0.25), target=(-1.0, 3.0, 0.6))
+    bar.hide_set(True)
+    assert [(source, entry.empty) for source, entry in handles_in_view(bpy.context)] == [(copied, own)]
+    result = bpy.data.objects.new("Result", bar.data.copy())
+    bpy.context.collection.objects.link(result)
+    bar.arapfields.results.add().item = result
+    assert empty in [entry.empty for _, entry in handles_in_view(bpy.context)]
