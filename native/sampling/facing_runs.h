@@ -53,9 +53,8 @@ class ARAPFIELDS_EXPORT_TO_TESTS FacingRuns {
   Balls balls_of(const RowMatrix<double>& rest, Index parent, Index rows, double far) const;
   std::vector<std::vector<Boxes>> boxes_of(const std::vector<Now>& now) const;
 
-  std::vector<Index> order_;  // spatial order of the samples at rest
-  std::vector<std::vector<Balls>>
-      balls_;  // at rest, of the nodes of each level; runs are children at level 0
+  std::vector<Index> order_;               // spatial order of the samples at rest
+  std::vector<std::vector<Balls>> balls_;  // at rest, of each level's nodes, from those above the runs up
   std::vector<Rest> rest_;
   float far_;
 };
