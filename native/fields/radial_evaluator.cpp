@@ -181,7 +181,8 @@ void RadialEvaluator<Scalar>::pull_back(JetView<const Scalar> cotangents, RowMat
         const RadialBlock<Scalar> data = block(b);
         const Index valid = std::min(block_size, count_ - b * block_size);
         const Eigen::Map<const Eigen::ArrayX<Scalar>> values(cotangents.at(0, b * block_size), 3 * valid);
-        if (columns_count == 1 && (values == Scalar(0)).all()) continue;  // as at most contact planes
+        if (columns_count == 1 && (values == Scalar(0)).all())
+          continue;  // most contact planes exert no force
         packed.fill(Scalar(0));
         for (int c = 0; c < columns_count; ++c) {
           const Scalar* from = cotangents.at(c, b * block_size);

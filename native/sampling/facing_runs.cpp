@@ -51,8 +51,7 @@ FacingRuns::FacingRuns(RowMatrix<double> rest, double far)
 }
 
 /// The balls around the rest coordinates of a node's children, which have so many rows each.
-FacingRuns::Balls FacingRuns::balls_of(const RowMatrix<double>& rest, Index parent, Index rows,
-                                       double far) const {
+FacingRuns::Balls FacingRuns::balls_of(const RowMatrix<double>& rest, Index parent, Index rows, double far) {
   Balls balls;
   for (Lanes& lanes : balls.middle) lanes.setZero();
   balls.left.setZero();

@@ -50,7 +50,7 @@ class ARAPFIELDS_EXPORT_TO_TESTS FacingRuns {
     float far;  // squared
   };
   static bool meet(const Rest& rest_a, const Rest& rest_b, const Now& a, const Now& b, const Limits& limits);
-  Balls balls_of(const RowMatrix<double>& rest, Index parent, Index rows, double far) const;
+  static Balls balls_of(const RowMatrix<double>& rest, Index parent, Index rows, double far);
   std::vector<std::vector<Boxes>> boxes_of(const std::vector<Now>& now) const;
 
   std::vector<Index> order_;               // spatial order of the samples at rest
