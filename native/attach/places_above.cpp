@@ -19,14 +19,14 @@ namespace {
 /// and the most of it in spacings.
 constexpr double disk = 2.8, least_disk = 1.6, most_disk = 6.4;
 /// Distance in spacings below which a sample's weight grows no more.
-constexpr double least_distance = 0.1;
+constexpr double least_spacings = 0.1;
 /// Deviation of the samples' answers in distances from the moved surface: up to the first they count alone,
 /// from the second the field does.
 constexpr double agreement = 0.1, contradiction = 1.0;
 /// But where large motions part or join what is near, a field off the surface can be steep: a point that it
 /// takes farther from the answers' mean than the first of these distances does not go there, wholly from the
 /// second on.
-constexpr double steady = 1.0, astray = 2.0;
+constexpr double steady_above = 1.0, astray = 2.0;
 
 }  // namespace
 
@@ -79,7 +79,7 @@ void PlacesAbove::adjust(const DeformationField& field, Points& moved) const {
       Vec3 mean = Vec3::Zero();
       for (const Index j : tree.within(point, reach_[i])) {
         const Vec3 offset = point - samples_.row(j).transpose();
-        const double distance = std::max(offset.norm(), least_distance * spacing_);
+        const double distance = std::max(offset.norm(), least_spacings * spacing_);
         const double kernel = std::max(1.0 / (distance * distance) - outside, 0.0);
         weights.push_back(kernel * std::sqrt(kernel));
         answers.push_back(Eigen::Map<const Vec3>(view.at(0, j)) + slopes[j] * offset);
@@ -97,7 +97,7 @@ void PlacesAbove::adjust(const DeformationField& field, Points& moved) const {
       if (!(height > 0.0)) continue;
       const double off = (mean.transpose() - own.row(i)).norm();
       const double share = std::max(1.0 - smooth_between(agreement, contradiction, apart / height),
-                                    smooth_between(steady, astray, off / height));
+                                    smooth_between(steady_above, astray, off / height));
       moved.row(i) += share * frame.scale * (mean.transpose() - own.row(i));
     }
   });

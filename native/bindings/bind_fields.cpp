@@ -63,14 +63,14 @@ Points inverse(const DeformationField& field, const ArrayArgument& points, doubl
   });
 }
 
-void save(const py::object& self, const PathArgument& path) {
+void save_field(const py::object& self, const PathArgument& path) {
   const auto& field = py::cast<const DeformationField&>(self);
   const std::string place = as_path(path), measured = report_text(report_or_none(self));
   const py::gil_scoped_release release;
   save_field(place, field, measured);
 }
 
-FieldResult load(const PathArgument& path) {
+FieldResult loaded_field(const PathArgument& path) {
   const std::string place = as_path(path);
   std::string measured;
   py::object field = py::cast(run_long([&] { return load_field(place, &measured); }));
@@ -118,12 +118,12 @@ The SolveReport of deform and stylize, the LiveReport, WrapReport or InverseRepo
 AttributeError for a field without one.)")
       // DeformationField[SolveReport] in annotations that are evaluated; see the stub.
       .def_static("__class_getitem__", [](const py::object&) { return py::type::of<DeformationField>(); })
-      .def("save", &save, "path"_a,
+      .def("save", &save_field, "path"_a,
            R"(
 Writes field and report as one file, in whole or not at all.
 
 OSError where the system refuses, InvalidInput for a path that is not a regular file.)")
-      .def_static("load", &load, "path"_a,
+      .def_static("load", &loaded_field, "path"_a,
                   R"(
 The field of a file that save() wrote, with its report.
 

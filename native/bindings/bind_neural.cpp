@@ -41,14 +41,14 @@ py::array_t<double> as_array(const Vector& flat, const std::vector<Index>& shape
   return array;
 }
 
-void save(const py::object& self, const PathArgument& path) {
+void save_network(const py::object& self, const PathArgument& path) {
   const auto& sdf = py::cast<const NeuralSdf&>(self);
   const std::string place = as_path(path), measured = report_text(report_or_none(self));
   const py::gil_scoped_release release;
   save_sdf(place, sdf, measured);
 }
 
-NeuralSdfResult load(const PathArgument& path) {
+NeuralSdfResult loaded_network(const PathArgument& path) {
   const std::string place = as_path(path);
   std::string measured;
   py::object sdf = py::cast(run_long([&] { return load_sdf(place, &measured); }));
@@ -104,10 +104,10 @@ is softplus's beta. InvalidInput where shapes do not fit or numbers are not fini
       .def_property_readonly(
           "report", [](const py::object& self) { return FitReportResult(report_of(self)); },
           "The FitReport; AttributeError for a network that fit_sdf did not make.")
-      .def("save", &save, "path"_a,
+      .def("save", &save_network, "path"_a,
            "Writes network, frame and report as one file, in whole or not at all; OSError where the system "
            "refuses.")
-      .def_static("load", &load, "path"_a,
+      .def_static("load", &loaded_network, "path"_a,
                   R"(
 The network of a file that save() wrote, with its report.
 

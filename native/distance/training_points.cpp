@@ -7,12 +7,12 @@
 namespace arapfields {
 namespace {
 
-constexpr Index grain = 4096;
+constexpr Index draws_at_once = 4096;
 
 Vec3 displaced(const AreaSampler& sampler, Random& random, double spread) {
-  const Vec3 on_surface = sampler.draw(random).point;
+  const Vec3 place = sampler.draw(random).point;
   const double x = random.normal(), y = random.normal(), z = random.normal();
-  return (on_surface + spread * Vec3(x, y, z)).cwiseMax(-1.0).cwiseMin(1.0);
+  return (place + spread * Vec3(x, y, z)).cwiseMax(-1.0).cwiseMin(1.0);
 }
 
 Vec3 anywhere(Random& random) {
@@ -30,7 +30,7 @@ TrainingPoints training_points(const SignedDistance& distance, const TriangleMes
 
   const Index near = options.near_points, count = near + options.uniform_points;
   TrainingPoints result{PointsF(count, 3), VectorF(count), near};
-  parallel_for(0, count, grain, [&](Index begin, Index end) {
+  parallel_for(0, count, draws_at_once, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       Random random(seed, static_cast<std::uint64_t>(i));
       const double spread = i % 2 == 0 ? options.near_spread : options.far_spread;

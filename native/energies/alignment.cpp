@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string>
 
+#include "core/decompositions.h"
 #include "core/errors.h"
 #include "energies/rotation.h"
 
@@ -15,7 +16,7 @@ Alignment best_alignment(PointsIn points, PointsIn targets, const Vector& weight
   const Eigen::RowVector3d from = weights.transpose() * points / total;
   const Eigen::RowVector3d to = weights.transpose() * targets / total;
   const Points arms = points.rowwise() - from, target_arms = targets.rowwise() - to;
-  const Mat3 spread = target_arms.transpose() * weights.asDiagonal() * arms;
+  const Mat3 spread = cross_moments(target_arms, Points(weights.asDiagonal() * arms));
   result.rotation = closest_rotation(spread + (tie * spread.norm() + 1e-300) * Mat3::Identity());
   result.translation = to.transpose() - result.rotation * from.transpose();
   const Points moved = (points * result.rotation.transpose()).rowwise() + result.translation.transpose();

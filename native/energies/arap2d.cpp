@@ -4,13 +4,11 @@
 #include <cmath>
 
 #include "core/errors.h"
+#include "energies/kernels.h"
 #include "energies/ranges.h"
 
 namespace arapfields {
 namespace {
-
-/// Lower clamp of t, the sum of signed singular values; the closest rotation is ambiguous at 0.
-constexpr double smallest_sum = 0.01;
 
 template <class Scalar>
 using Matrix2 = Eigen::Matrix<Scalar, 2, 2>;

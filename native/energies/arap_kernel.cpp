@@ -6,9 +6,6 @@
 namespace arapfields::SIMD_LEVEL {
 namespace {
 
-/// Lower clamp of K's eigenvalues, sums of two signed singular values; at 0 R is ambiguous.
-template <class Scalar>
-constexpr Scalar smallest_sum = Scalar(0.01);
 constexpr int second_column[3][3] = {{4, 7, 8}, {7, 5, 9}, {8, 9, 6}};
 
 template <class Scalar>
@@ -61,7 +58,7 @@ inline void evaluate_bend(const ArapBlock<Scalar>& block, std::int64_t point, st
   Pack<Scalar> d[10][3];
   for (int c = 4; c < 10; ++c) load_points(block.jets + (c * block.count + point) * 3, valid, d[c]);
   for (int c = 0; c < 3; ++c) {
-    const Pack<Scalar> least = broadcast(smallest_sum<Scalar>);
+    const Pack<Scalar> least = broadcast(Scalar(smallest_sum));
     bend.inverse_sums[c] = Scalar(1) / (polar.sums[c] > least ? polar.sums[c] : least);
   }
   bend.value = Pack<Scalar>{};

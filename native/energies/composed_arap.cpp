@@ -3,13 +3,12 @@
 
 #include "core/jets.h"
 #include "energies/composed_energies.h"
+#include "energies/kernels.h"
 #include "tensors/operations.h"
 #include "tensors/views.h"
 
 namespace arapfields {
 namespace {
-
-constexpr double smallest_sum = 0.01;  // as in arap_kernel.cpp
 
 template <std::size_t size>
 Tensor table(const std::array<double, size>& numbers, SizeList sizes, const Tensor& like) {

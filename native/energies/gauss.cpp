@@ -98,7 +98,7 @@ Points unit_normals(PointsIn normals) {
 
 double style_sharpness(PointsIn normals) {
   const Points unit = unit_normals(normals);
-  const Eigen::MatrixXd cosines = unit * unit.transpose();
+  const Eigen::MatrixXd cosines = product(unit, unit.transpose());
   const std::vector<Index> faces = faces_of(cosines);
   double nearest = -1.0;
   for (Index i = 0; i < unit.rows(); ++i)

@@ -8,6 +8,9 @@
 
 namespace arapfields {
 
+/// Lower clamp of K's eigenvalues, sums of two signed singular values; at 0 R is ambiguous.
+constexpr double smallest_sum = 0.01;
+
 /// Columns of `jets` and `cotangents` (null: values alone) are count·3 apart. Factors (count; null: ones) are
 /// the points' own. Sums, not means, are added to sums[0] (stretch), sums[1] (bend) and sums[2] (stretch +
 /// bending·bend, with the factors).

@@ -22,7 +22,7 @@ struct Lean {
 };
 
 Lean lean_of(const Points& arms, const Points& displacements, const Vec3& up) {
-  const Mat3 spread = arms.transpose() * arms, moment = arms.transpose() * displacements;
+  const Mat3 spread = cross_moments(arms, arms), moment = cross_moments(arms, displacements);
   const double size = spread.trace();
   if (!(size > 0.0)) return {};
   const Mat3 inertia = (1.0 + Stance::thinnest) * size * Mat3::Identity() - spread;

@@ -55,12 +55,12 @@ Rows joined(std::initializer_list<Rows> parts) {
 
 constexpr double golden = std::numbers::phi;
 
-struct Style {
+struct NamedStyle {
   const char* name;
   Rows (*normals)();
 };
 
-constexpr Style styles[] = {
+constexpr NamedStyle styles[] = {
     {"cube", [] { return joined({signs(1, 0, 0), signs(0, 1, 0), signs(0, 0, 1)}); }},
     {"tetrahedron",
      [] {
@@ -89,13 +89,13 @@ constexpr Style styles[] = {
 
 std::vector<std::string> style_names() {
   std::vector<std::string> names;
-  for (const Style& style : styles) names.emplace_back(style.name);
+  for (const NamedStyle& style : styles) names.emplace_back(style.name);
   return names;
 }
 
 Points preferred_normals(const std::string& name) {
   std::string known;
-  for (const Style& style : styles) {
+  for (const NamedStyle& style : styles) {
     if (name == style.name) {
       const Rows rows = style.normals();
       Points result(static_cast<Index>(rows.size()), 3);

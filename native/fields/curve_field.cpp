@@ -16,12 +16,12 @@ namespace {
 std::vector<Vec2> grid_nodes(Points2In points, double spacing, double margin, double most_cells) {
   const Vec2 low = points.colwise().minCoeff().transpose(), high = points.colwise().maxCoeff().transpose();
   const Vec2 middle = 0.5 * (low + high);
-  const auto half = [&](int axis) {
+  const auto steps = [&](int axis) {
     return static_cast<Index>(std::ceil(0.5 * (high - low)(axis) / spacing + margin));
   };
   std::vector<Vec2> nodes;
-  for (Index i = -half(0); i <= half(0); ++i)
-    for (Index j = -half(1); j <= half(1); ++j) {
+  for (Index i = -steps(0); i <= steps(0); ++i)
+    for (Index j = -steps(1); j <= steps(1); ++j) {
       const Vec2 node = middle + spacing * Vec2(static_cast<double>(i), static_cast<double>(j));
       const double nearest = (points.rowwise() - node.transpose()).rowwise().squaredNorm().minCoeff();
       if (nearest <= most_cells * most_cells * spacing * spacing) nodes.push_back(node);

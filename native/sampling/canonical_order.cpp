@@ -21,7 +21,7 @@ std::vector<std::uint32_t> canonical_order(PointsIn points) {
   const Frame frame = Frame::balanced(points, Vector::Ones(n), {}, 1.0);
   Points placed = frame.to_cube(points);
   for (Index i = 0; i < n; ++i) placed.row(i) *= std::min(1.0, far / std::max(placed.row(i).norm(), 1e-300));
-  const Mat3 axes = symmetric_eigen3(Mat3(placed.transpose() * placed)).vectors;
+  const Mat3 axes = symmetric_eigen3(cross_moments(placed, placed)).vectors;
   placed = (placed * axes).eval();
   for (int k = 0; k < 3; ++k)  // axes are oriented by the sign of the third moment
     if (placed.col(k).array().cube().sum() < 0.0) placed.col(k) *= -1.0;

@@ -10,7 +10,7 @@
 namespace arapfields {
 namespace {
 
-constexpr Index leaf = 12, grain = 256;
+constexpr Index leaf = 12, queries_at_once = 256;
 
 }  // namespace
 
@@ -55,7 +55,7 @@ std::vector<Index> OrientedPoints::nearest(PointsIn others, PointsIn normals, do
                                            const std::vector<Index>& guesses) const {
   std::vector<Index> result(others.rows());
   const double turn_square = turn * turn;
-  parallel_for(0, others.rows(), grain, [&](Index begin, Index end) {
+  parallel_for(0, others.rows(), queries_at_once, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       const Vec3 place = others.row(i), normal = normals.row(i);
       double best = std::numeric_limits<double>::infinity();

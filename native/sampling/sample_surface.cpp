@@ -19,8 +19,8 @@ constexpr Index most_lines_a_round = 1 << 18;
 constexpr Index hopeless_lines = 1 << 18;  // without a crossing: there is no surface
 // Limits of the work. Smooth surfaces take ten values a sample, those with noise of 0.001 a hundred.
 constexpr Index most_lines_a_sample = 1 << 15, most_values = 1 << 20, most_values_a_sample = 1 << 10;
-// Sign changes after which less than one zero in least_share of them is an error: Φ jumps instead.
-constexpr Index fewest_sign_changes = 1000, least_share = 100;
+// Sign changes after which less than one zero in share_of_signs of them is an error: Φ jumps instead.
+constexpr Index fewest_sign_changes = 1000, share_of_signs = 100;
 constexpr double least_slope = 1e-5;  // a distance's is 1; points are where |Φ| is below 2e-6
 constexpr double thickest = 0.1;  // largest mean length of a line's parts with Φ = 0, cube units a crossing
 constexpr std::uint64_t shuffle_stream = ~std::uint64_t{0};
@@ -89,7 +89,7 @@ class Caster {
 void require_surface(const Caster& caster, const EvaluationCounter& function, Index wanted) {
   const auto crossings = static_cast<Index>(caster.brackets.size());
   const Index cast = caster.lines_cast();
-  if (caster.zero_length > thickest * static_cast<double>(std::max(crossings, cast / least_share)))
+  if (caster.zero_length > thickest * static_cast<double>(std::max(crossings, cast / share_of_signs)))
     throw_empty("it is 0 on an open set of the cube, not on a surface alone");
   const std::string of_lines = std::to_string(crossings) + " crossings of " + std::to_string(cast) + " lines";
   if (crossings == 0 ? cast > hopeless_lines : cast > hopeless_lines + most_lines_a_sample * wanted)
@@ -155,7 +155,7 @@ SurfaceSamples sample_surface(const ImplicitFunction& implicit, const SampleOpti
       samples.points.row(done) = crossings.points.row(i).cast<double>();
       samples.normals.row(done++) = directions.row(i);
     }
-    if (static_cast<Index>(used) > fewest_sign_changes && done < static_cast<Index>(used) / least_share)
+    if (static_cast<Index>(used) > fewest_sign_changes && done < static_cast<Index>(used) / share_of_signs)
       throw_empty("its values jump from one sign to the other, or are too steep for single precision");
     largest = std::max(largest, crossings.largest);
   }

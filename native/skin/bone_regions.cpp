@@ -11,7 +11,7 @@
 namespace arapfields {
 namespace {
 
-constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr float unreached = std::numeric_limits<float>::infinity();
 /// A bone may influence another's region within so many steps, or if the bones between them have at most this
 /// length, relative to the distance.
 constexpr int most_steps = 2;
@@ -35,7 +35,7 @@ BoneRegions::BoneRegions(const Skeleton& skeleton, const PiecePoints& surfaces,
 RowMatrix<float> BoneRegions::distances(const InteriorGraph& graph) const {
   RowMatrix<float> result(straight.rows(), straight.cols());
   parallel_jobs(straight.cols(), [&](Index b) {
-    std::vector<float> start(owner.size(), infinity);
+    std::vector<float> start(owner.size(), unreached);
     for (Index i = 0; i < graph.size(); ++i)
       if (owner[i] == b) start[i] = straight(i, b);
     if (std::ranges::find(owner, b) == owner.end()) {  // a bone that owns no node starts at the nearest

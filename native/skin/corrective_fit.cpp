@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "skin/corrective_fit.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -9,13 +8,14 @@
 #include <map>
 #include <utility>
 
+#include "core/decompositions.h"
 #include "core/parallel.h"
 #include "skin/example_poses.h"
 
 namespace arapfields {
 namespace {
 
-constexpr std::uint64_t stream = 35;
+constexpr std::uint64_t pose_stream = 35;
 /// Example poses for each feature of the regression, and bounds of their number.
 constexpr Index poses_per_feature = 4, least_poses = 36, most_poses = 288;
 /// Skin weight above which a bone moves a vertex.
@@ -85,7 +85,7 @@ CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::
       right_[i].setZero(static_cast<Index>(regions[region_of_[i]].joints.size()) * joint_features, 3);
   }
   ExamplePoses examples(rig, vertices, options, progress.part(0.0, 0.1));
-  Random random(options.seed, stream);
+  Random random(options.seed, pose_stream);
   const Vector always = Vector::Ones(joints);
   for (Index p = 0; p < poses; ++p) {
     progress.report(0.1 + 0.9 * static_cast<double>(p) / static_cast<double>(poses), "Posing");
@@ -95,7 +95,7 @@ CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::
       values.block<1, joint_features>(p, b * joint_features) = features;
       if (reflection.exists())
         values.block<1, joint_features>(poses + p, reflection.twin(b) * joint_features) =
-            reflection.maps[b] * features;
+            reflection.maps[b].lazyProduct(features);
     }
     const Eigen::VectorXf features = values.row(p).cast<float>();
     parallel_for(0, n, 256, [&](Index first, Index last) {
@@ -118,9 +118,9 @@ CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::
       }
     });
   }
-  const auto own = values.topRows(poses), others = values.bottomRows(values.rows() - poses);
-  square_ = own.transpose() * own;
-  mirrored_square_ = others.transpose() * others;
+  const Eigen::MatrixXd own = values.topRows(poses), others = values.bottomRows(values.rows() - poses);
+  square_ = transposed_product(own, own);
+  mirrored_square_ = transposed_product(others, others);
 }
 
 void CorrectiveFit::find_regions(const Skeleton& skeleton, const RowMatrix<float>& weights) {
@@ -168,7 +168,8 @@ Eigen::MatrixXd CorrectiveFit::right(const Region& region, Index vertex) const {
     const auto at = std::ranges::find(joints, joint) - joints.begin();
     if (at == static_cast<Index>(joints.size())) continue;
     result.middleRows<joint_features>(static_cast<Index>(k) * joint_features) +=
-        reflection.maps[joint] * right_[twin].middleRows<joint_features>(at * joint_features).cast<double>() *
+        product(reflection.maps[joint],
+                right_[twin].middleRows<joint_features>(at * joint_features).cast<double>()) *
         reflection.signs.asDiagonal();
   }
   return result;
@@ -179,14 +180,14 @@ Eigen::MatrixXd CorrectiveFit::slopes(const Region& region, const Eigen::MatrixX
   const std::vector<Index> columns = columns_of(region.joints);
   Eigen::MatrixXd square = square_(columns, columns);
   if (region.mirrored) square += mirrored_square_(columns, columns);
-  square = polynomials.transpose() * square * polynomials;
+  square = product(transposed_product(polynomials, square), polynomials);
   square.diagonal() *= 1.0 + ridge;
   square.diagonal().array() += 1e-12;
   const Index count = (static_cast<Index>(region.vertices.size()) + step - 1) / step;
   Eigen::MatrixXd rights(polynomials.cols(), 3 * count);
   for (Index k = 0; k < count; ++k)
-    rights.middleCols<3>(3 * k) = polynomials.transpose() * right(region, region.vertices[k * step]);
-  return square.ldlt().solve(rights);
+    rights.middleCols<3>(3 * k) = transposed_product(polynomials, right(region, region.vertices[k * step]));
+  return solve_definite(square, rights);
 }
 
 }  // namespace arapfields

@@ -29,23 +29,24 @@ std::vector<Key> chosen_keys(const Skeleton& skeleton, const CorrectiveFit& fit,
   std::vector<Key> all, result;
   for (Index b = 0; b < skeleton.count(); ++b) {
     if (skeleton.bone(b).parent < 0 || reflection.twin(b) < b) continue;
-    const auto x = fit.values.middleCols(b * joint_features, joint_features);
-    FeaturePairs moments = x.transpose() * x / static_cast<double>(x.rows());
+    const Eigen::MatrixXd x = fit.values.middleCols(b * joint_features, joint_features);
+    FeaturePairs moments = transposed_product(x, x) / static_cast<double>(x.rows());
     moments.diagonal().array() += 1e-12;
     const auto [values, vectors] = symmetric_eigen(moments);
     const Vector roots = values.cwiseSqrt();
-    const FeaturePairs root = vectors * roots.asDiagonal() * vectors.transpose();
-    const FeaturePairs inverse_root = vectors * roots.cwiseInverse().asDiagonal() * vectors.transpose();
+    const FeaturePairs across = vectors.transpose();
+    const FeaturePairs root = product(vectors * roots.asDiagonal(), across);
+    const FeaturePairs inverse_root = product(vectors * roots.cwiseInverse().asDiagonal(), across);
     FeaturePairs gains = effect[b];
     if (reflection.exists() && reflection.twin(b) == b) {  // keys become even or odd
       FeaturePairs swap(joint_features, joint_features);
       for (int f = 0; f < joint_features; ++f) swap.col(f) = reflection.polynomial(b, JointFeatures::Unit(f));
-      gains = 0.5 * (gains + FeaturePairs(swap * gains * swap.transpose()));
+      gains = 0.5 * (gains + product(product(swap, gains), swap.transpose()));
     }
-    const auto main = symmetric_eigen(root * gains * root);
+    const auto main = symmetric_eigen(product(product(root, gains), root));
     for (int k = 0; k < joint_features; ++k) {
-      JointFeatures c = inverse_root * main.vectors.col(k);
-      c /= std::max((x * c).cwiseAbs().maxCoeff(), 1e-12);
+      JointFeatures c = product(inverse_root, main.vectors.col(k));
+      c /= std::max(product(x, c).cwiseAbs().maxCoeff(), 1e-12);
       all.push_back({main.values[k], b, c});
     }
   }
@@ -75,8 +76,8 @@ std::vector<FeaturePairs> effects_of(const RigShape& rig, const CorrectiveFit& f
         fit.slopes(region, Eigen::MatrixXd::Identity(count, count), 1 + vertices / most_seen);
     const double share = static_cast<double>(3 * region.vertices.size()) / static_cast<double>(slopes.cols());
     for (Index row = 0; row < count; row += joint_features) {
-      const auto part = slopes.middleRows(row, joint_features);
-      parts[r].push_back(share * part * part.transpose());
+      const Eigen::MatrixXd part = slopes.middleRows(row, joint_features);
+      parts[r].push_back(share * product(part, part.transpose()));
     }
   });
   progress.check();

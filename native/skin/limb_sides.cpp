@@ -8,7 +8,7 @@
 namespace arapfields {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double endless = std::numeric_limits<double>::infinity();
 /// Length, in sizes of the shape, over which the opposite side's influence vanishes where limbs separate.
 constexpr double fade = 0.04;
 /// Smaller influences are set to 0.
@@ -24,8 +24,8 @@ constexpr double facing_end = 0.5;
 
 /// A chain or tree of bones on one side.
 struct Limb {
-  Vec3 along = Vec3::Zero();   ///< unit vector within the symmetry plane, towards the farthest end
-  double parting = -infinity;  ///< where along it the limb separates from its twin; −infinity: nowhere
+  Vec3 along = Vec3::Zero();  ///< unit vector within the symmetry plane, towards the farthest end
+  double parting = -endless;  ///< where along it the limb separates from its twin; −infinity: nowhere
 };
 
 /// The root bone of each bone's limb.
@@ -41,7 +41,7 @@ std::vector<Index> roots_of(const RigShape& rig) {
 
 /// The bone nearest to a place on the surface, by a distance that penalises bones on its outer side.
 Index nearest_bone(const Skeleton& skeleton, const Vec3& place, const Vec3& normal) {
-  double least = infinity;
+  double least = endless;
   Index result = 0;
   for (Index b = 0; b < skeleton.count(); ++b) {
     const Vec3 to = skeleton.nearest(b, place) - place;
@@ -110,7 +110,7 @@ LimbSides::LimbSides(const RigShape& rig, const PiecePoints& given, const std::v
     const double closed = 1.0 - gap / (gap_fade * rig.extent);
     const Limb& limb = limbs[roots[own]];
     double open = closed;
-    if (limb.parting > -infinity) {
+    if (limb.parting > -endless) {
       const double same = (normals.row(i).dot(normal) - sheet_cosine) / (1.0 - sheet_cosine);
       open = std::max(1.0 + (limb.parting - limb.along.dot(points.row(i))) / (fade * rig.extent),
                       std::clamp(closed, 0.0, 1.0) * std::min(1.0, 2.0 * same));

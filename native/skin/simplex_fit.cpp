@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "core/decompositions.h"
+
 namespace arapfields {
 namespace {
 
@@ -63,10 +65,10 @@ std::vector<Index> positive(const FewBones& w) {
 /// The used weight whose removal increases the objective least, w_j² / (H⁻¹)_jj, with the others adapted
 /// (Hassibi, Stork 1993).
 Index cheapest(const BonePairs& h, const FewBones& w, const std::vector<Index>& used) {
-  BonePairs part = h(used, used);
+  Eigen::MatrixXd part = h(used, used);
   part.diagonal().array() *= 1.0 + 1e-12;
   const auto n = static_cast<Index>(used.size());
-  const BonePairs inverse = part.ldlt().solve(BonePairs::Identity(n, n));
+  const Eigen::MatrixXd inverse = solve_definite(part, Eigen::MatrixXd::Identity(n, n));
   Index best = used.front();
   double least = std::numeric_limits<double>::infinity();
   for (Index j = 0; j < n; ++j) {

@@ -15,7 +15,7 @@
 namespace arapfields {
 namespace {
 
-constexpr std::uint64_t stream = 34;
+constexpr std::uint64_t example_stream = 34;
 /// Poses of a round; joints with larger errors in the round before rotate more often.
 constexpr int round_poses = 8;
 /// Least probability with which a joint rotates in a pose.
@@ -55,7 +55,7 @@ Fitted fitted_nodes(const RigShape& rig, PointsIn points, const std::vector<Inde
   if (rig.cuts_itself()) poses.hold(nearest);
   WeightFit fit(rig);
   Fitted result;
-  Random random(options.seed, stream);
+  Random random(options.seed, example_stream);
   Vector activity = Vector::Ones(rig.skeleton.count());
   for (int done = 0; done < options.poses; done += round_poses) {
     const double share = static_cast<double>(done) / options.poses;

@@ -15,7 +15,7 @@ constexpr double reach = 2.5, other_side = 1e-4;
 /// Tikhonov term on the gradient, for points with few nodes nearby.
 constexpr double damping = 0.05;
 /// Least weight of a node; below it the point lies beside all nodes, and the weighted mean is used.
-constexpr double least_weight = -0.25;
+constexpr double most_negative = -0.25;
 
 }  // namespace
 
@@ -48,7 +48,7 @@ VertexBlend::VertexBlend(const RigShape& rig, const PiecePoints& given, const st
       moments.diagonal().tail<3>().array() += damping * total;
       Eigen::Vector4d factor = moments.ldlt().solve(Eigen::Vector4d::UnitX());
       for (std::size_t k = 0; k < near.size(); ++k)
-        if (kernel[k] * factor.dot(lines[k]) < least_weight) factor = Eigen::Vector4d::UnitX();
+        if (kernel[k] * factor.dot(lines[k]) < most_negative) factor = Eigen::Vector4d::UnitX();
       for (std::size_t k = 0; k < near.size(); ++k)
         entries_[i].push_back({near[k], static_cast<float>(kernel[k] * factor.dot(lines[k]))});
       double sum = 0.0;

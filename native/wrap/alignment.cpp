@@ -109,7 +109,7 @@ class IterativeClosestPoints {
 Mat3 principal_axes(PointsIn points) {
   const Eigen::RowVector3d middle = points.colwise().mean();
   const Points arms = points.rowwise() - middle;
-  Mat3 axes = symmetric_eigen3(Mat3(arms.transpose() * arms)).vectors;
+  Mat3 axes = symmetric_eigen3(cross_moments(arms, arms)).vectors;
   if (axes.determinant() < 0.0) axes.col(0) *= -1.0;
   return axes;
 }

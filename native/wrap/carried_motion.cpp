@@ -15,7 +15,7 @@ namespace {
 
 /// The length L, as a fraction of the diagonal, below which differences prevail over M(δ), and over which J
 /// is smoothed.
-constexpr double reach = 0.03;
+constexpr double edge_length = 0.03;
 /// Least cotangent weight: obtuse triangles would have negative ones, which fold.
 constexpr double least_weight = 0.01;
 /// Relative deviation of J times the edge between two places from the receiving edge, above which the places
@@ -55,7 +55,7 @@ CarriedMotion::CarriedMotion(const TriangleMesh& giving, const TriangleMesh& rec
   }
   progress.check();
 
-  const double length = reach * diagonal_of(receiving.vertices);
+  const double length = edge_length * diagonal_of(receiving.vertices);
   anchors_ = areas / std::max(length * length, 1e-300);
   for (Index v = 0; v < count; ++v)
     if (!(anchors_[v] > 0.0)) anchors_[v] = 1.0;  // isolated vertices, and duplicates at a position

@@ -4,13 +4,14 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "core/decompositions.h"
 #include "core/parallel.h"
 
 namespace arapfields {
 namespace {
 
 /// Cut-off of the Gaussian weights, in radii: exp(−4) there.
-constexpr double reach = 2.0;
+constexpr double weights_end = 2.0;
 /// Tikhonov term of the fits, as a fraction of the sum of weights: few or collinear points then give a plane.
 constexpr double fit_ridge = 1e-4;
 
@@ -19,13 +20,14 @@ template <class Visit>
 void visit_about(const OrientedPoints& surface, const Vec3& place, const Vec3& normal, double radius,
                  Visit&& visit) {
   const Vec3 first = normal.unitOrthogonal(), second = normal.cross(first);
-  surface.visit_within(place, reach * radius, [&](Index k, const Vec3& point, const Vec3& point_normal) {
-    const double facing = point_normal.dot(normal);
-    if (!(facing > 0.0)) return;
-    const Vec3 offset = (point - place) / radius;
-    visit(k, offset.dot(first), offset.dot(second), offset.dot(normal),
-          facing * std::exp(-offset.squaredNorm()));
-  });
+  surface.visit_within(place, weights_end * radius,
+                       [&](Index k, const Vec3& point, const Vec3& point_normal) {
+                         const double facing = point_normal.dot(normal);
+                         if (!(facing > 0.0)) return;
+                         const Vec3 offset = (point - place) / radius;
+                         visit(k, offset.dot(first), offset.dot(second), offset.dot(normal),
+                               facing * std::exp(-offset.squaredNorm()));
+                       });
 }
 
 }  // namespace
@@ -69,7 +71,7 @@ SurfaceCurvature curvature_at(PointsIn points, PointsIn normals, PointsIn places
                               double radius, const Progress& progress) {
   const RowMatrix<double> values = curvature_values(points, normals, points, normals, radius, progress);
   const OrientedPoints surface(points, normals);
-  const double near = radius / reach;
+  const double near = radius / weights_end;
   SurfaceCurvature result{radius, RowMatrix<double>::Zero(places.rows(), 2),
                           RowMatrix<double>::Zero(places.rows(), 6)};
   parallel_for(0, places.rows(), 64, [&](Index begin, Index end) {
@@ -82,12 +84,12 @@ SurfaceCurvature curvature_at(PointsIn points, PointsIn normals, PointsIn places
                     columns.leftCols(2).noalias() += weight * terms * values.row(k);
                   });
       matrix.diagonal().array() += fit_ridge * matrix(0, 0) + 1e-300;
-      const Mat3 fit = matrix.ldlt().solve(columns);
       const Vec3 normal = place_normals.row(i), first = normal.unitOrthogonal(), second = normal.cross(first);
-      result.values.row(i) = fit.row(0).head(2);
-      for (int c = 0; c < 2; ++c)
-        result.gradients.row(i).segment<3>(3 * c) =
-            ((fit(1, c) * first + fit(2, c) * second) / near).transpose();
+      for (int c = 0; c < 2; ++c) {
+        const Vec3 fit = solve_definite(matrix, columns.col(c));
+        result.values(i, c) = fit[0];
+        result.gradients.row(i).segment<3>(3 * c) = ((fit[1] * first + fit[2] * second) / near).transpose();
+      }
     }
   });
   progress.check();

@@ -19,7 +19,7 @@ constexpr int normal_rounds = 3;
 /// Values are clamped to this multiple of the median absolute value.
 constexpr double outlier = 3.7;
 /// Fewest pairs of neighbours for an estimate.
-constexpr Index least_pairs = 500;
+constexpr Index enough_pairs = 500;
 /// The shape's part in the estimate by second Laplacians, as a fraction of the difference of both estimates:
 /// the largest seen on 37 clean meshes of 500 to 60,000 vertices, but for one coarse and shaggy one.
 constexpr double shape_share = 0.35;
@@ -121,7 +121,7 @@ double covariance(const Vector& values, const std::vector<std::pair<std::int32_t
 
 double noise_variance(const TriangleMesh& mesh, const WeldedVertices& welded, const Neighbours& neighbours) {
   const auto pairs = inner_pairs(neighbours);
-  if (static_cast<Index>(pairs.size()) < least_pairs) return 0.0;
+  if (static_cast<Index>(pairs.size()) < enough_pairs) return 0.0;
   Points normals = welded.normals;
   for (int round = 0; round < normal_rounds; ++round) normals -= neighbours.differences(normals);
   normals = unit_rows(normals);

@@ -2,7 +2,6 @@
 #include "wrap/smooth_map.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -21,13 +20,13 @@ namespace {
 // the diagonal.
 
 /// Random points on the surface, and the farthest-point samples among them.
-constexpr Index candidates = 4000, chosen = 1000;
+constexpr Index candidate_count = 4000, surface_count = 1000;
 /// Smoothing parameter of a surface point.
 constexpr double point_smoothing = 2e-3;
 /// Points off the surface, on both sides, where space is scaled like the square root of the area: they fix
 /// the map across flat parts. Their number, offset along the normal, and smoothing parameter.
 constexpr Index beside = 250;
-constexpr double offset = 0.03, offset_smoothing = 1.0;
+constexpr double surface_offset = 0.03, offset_smoothing = 1.0;
 
 /// Error of a point's image at which the map's weight is a quarter.
 constexpr double missed_share = 0.03;
@@ -49,23 +48,22 @@ SmoothingSpline::SmoothingSpline(PointsIn centers, const Vector& smoothing, cons
   const Points units = map_.in_units(centers);
   map_.centers_ = units.array();
 
-  Eigen::Matrix<double, Eigen::Dynamic, 4> plane(centers.rows(), 4);
+  Eigen::MatrixXd plane(centers.rows(), 4);
   plane << Vector::Ones(centers.rows()), units;
-  turn_.compute(plane);
+  turn_ = OrthogonalFactor(plane);
   const Index all = centers.rows(), inner = all - std::min<Index>(4, all);
   if (inner == 0) return;
 
   // (K + S) w + P a = y with Pᵀ w = 0: definite for w = Q₂ z, Q₂ an orthonormal basis of Pᵀ's null space.
-  RowMatrix<double> matrix(all, all);
+  Eigen::MatrixXd matrix(all, all);
   parallel_for(0, all, 16, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i)
-      matrix.row(i) = (units.rowwise() - units.row(i)).rowwise().norm().array().cube().matrix().transpose();
+      matrix.col(i) = (units.rowwise() - units.row(i)).rowwise().norm().array().cube().matrix();
   });
   matrix.diagonal() += smoothing;
   progress.check();
-  const auto q = turn_.householderQ();
-  RowMatrix<double> turned = q.adjoint() * matrix;
-  turned = (q.adjoint() * turned.transpose()).eval();
+  const Eigen::MatrixXd half = turn_.transposed_times(matrix),
+                        turned = turn_.transposed_times(half.transpose());
   progress.check();
   across_ = turned.topRightCorner(4, inner);
   factor_ = cholesky<double>(turned.bottomRightCorner(inner, inner));
@@ -74,25 +72,24 @@ SmoothingSpline::SmoothingSpline(PointsIn centers, const Vector& smoothing, cons
 
 SmoothMap SmoothingSpline::fit(PointsIn values) const {
   const Index all = values.rows(), plane = std::min<Index>(4, all), inner = all - plane;
-  const auto q = turn_.householderQ();
-  RowMatrix<double> right = q.adjoint() * values, weights = RowMatrix<double>::Zero(all, 3);
+  Eigen::MatrixXd right = turn_.transposed_times(values), weights = Eigen::MatrixXd::Zero(all, 3);
   if (inner > 0) {
     weights.bottomRows(inner) = cholesky_solve<double>(factor_, right.bottomRows(inner));
-    right.topRows(plane) -= across_ * weights.bottomRows(inner);
+    right.topRows(plane) -= product(across_, weights.bottomRows(inner));
   }
   // Coplanar centers do not determine the affine part across their plane: the minimum-norm one is taken.
-  const Eigen::MatrixXd upper = turn_.matrixQR().topRows(plane).triangularView<Eigen::Upper>();
   SmoothMap map = map_;
-  map.affine_ = upper.completeOrthogonalDecomposition().solve(right.topRows(plane));
-  map.weights_ = (q * weights).array();
+  map.affine_ = least_squares(turn_.upper(), right.topRows(plane));
+  map.weights_ = turn_.times(weights).array();
   return map;
 }
 
 SmoothMap surface_map(const TriangleMesh& from, PointsIn to, const Progress& progress) {
   const AreaSampler sampler(from.vertices, from.triangles);
   Random random(0);
-  Points before(candidates, 3), after(candidates, 3), normals(candidates, 3), moved_normals(candidates, 3);
-  for (Index i = 0; i < candidates; ++i) {
+  Points before(candidate_count, 3), after(candidate_count, 3), normals(candidate_count, 3),
+      moved_normals(candidate_count, 3);
+  for (Index i = 0; i < candidate_count; ++i) {
     const AreaSampler::Draw draw = sampler.draw(random);
     before.row(i) = draw.point;
     after.row(i).setZero();
@@ -102,7 +99,7 @@ SmoothMap surface_map(const TriangleMesh& from, PointsIn to, const Progress& pro
     normals.row(i) = normal.normalized();
     moved_normals.row(i) = moved / std::sqrt(std::max(moved.norm() * normal.norm(), 1e-300));
   }
-  const std::vector<Index> rows = farthest_points(before, chosen).indices;
+  const std::vector<Index> rows = farthest_points(before, surface_count).indices;
   const auto count = static_cast<Index>(rows.size()), sides = std::min(beside, count), all = count + sides;
   Points values(all, 3), centers(all, 3);
   Vector least = Vector::Constant(all, point_smoothing);
@@ -110,7 +107,7 @@ SmoothMap surface_map(const TriangleMesh& from, PointsIn to, const Progress& pro
   values.topRows(count) = rows_of(after, rows);
   const double size = diagonal_of(before);
   for (Index i = 0; i < sides; ++i) {
-    const double height = (i % 2 == 0 ? offset : -offset) * size;
+    const double height = (i % 2 == 0 ? surface_offset : -surface_offset) * size;
     centers.row(count + i) = before.row(rows[i]) + height * normals.row(rows[i]);
     values.row(count + i) = after.row(rows[i]) + height * moved_normals.row(rows[i]);
     least[count + i] = offset_smoothing;

@@ -2,9 +2,9 @@
 // Smoothing splines of space that map one surface to another.
 #pragma once
 
-#include <Eigen/QR>
 #include <vector>
 
+#include "core/decompositions.h"
 #include "core/task.h"
 #include "mesh/triangle_mesh.h"
 
@@ -45,8 +45,8 @@ class ARAPFIELDS_EXPORT_TO_TESTS SmoothingSpline {
 
  private:
   SmoothMap map_;  // without weights
-  Eigen::HouseholderQR<Eigen::Matrix<double, Eigen::Dynamic, 4>> turn_;
-  RowMatrix<double> across_;
+  OrthogonalFactor turn_;
+  Eigen::MatrixXd across_;
   RowMatrix<double> factor_;  // empty for four centers and fewer
 };
 

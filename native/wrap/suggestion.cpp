@@ -28,7 +28,7 @@ constexpr double end_reach = 0.12;
 /// Extremities that the wrap brings within this fraction of the target's diagonal correspond.
 constexpr double same_end = 0.1;
 /// Options of the coarse wrap.
-constexpr int coarse_centers = 200, coarse_stages = 4, coarse_iterations = 4;
+constexpr int suggestion_centers = 200, suggestion_stages = 4, suggestion_iterations = 4;
 
 /// Farthest-point samples in interior distance, in the order of their choice, and which are extremities.
 struct FarPlaces {
@@ -77,9 +77,9 @@ std::vector<Landmark> suggest_landmarks(const SurfaceSamples& samples, const Imp
           "one a sample is needed");
   require(count > 0, "count", std::to_string(count), "at least 1 is needed");
   WrapOptions options = given;
-  options.centers = std::min(options.centers, coarse_centers);
-  options.stages = coarse_stages;
-  options.iterations = coarse_iterations;
+  options.centers = std::min(options.centers, suggestion_centers);
+  options.stages = suggestion_stages;
+  options.iterations = suggestion_iterations;
   const ThreadScope threads(options.threads);
   const auto seed = static_cast<std::uint64_t>(options.seed);
 

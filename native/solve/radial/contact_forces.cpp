@@ -14,7 +14,7 @@ namespace {
 /// Gauss–Seidel sweeps for the factors of the surfaces' pressures.
 constexpr int scalings = 20;
 /// Planes whose normals have at least this cosine count as parallel.
-constexpr double alike = 0.9;
+constexpr double parallel_cosine = 0.9;
 /// A projection adds at most `planes_at_once` constraints in each of `searches` rounds; parallel ones are at
 /// least `apart` from each other at rest, in cube units.
 constexpr Index planes_at_once = 60;
@@ -25,13 +25,13 @@ constexpr double farther = 3.0;
 /// Penetration depth beyond a margin that a time step may leave, in cube units.
 constexpr double deep_in_motion = 3.0 * ContactSet::deep;
 /// Tolerance of the projection's gaps, in cube units.
-constexpr double slight = 1e-4;
+constexpr double projection_gap = 1e-4;
 
 /// Indices of the planes with the most negative gaps, without near and parallel ones.
 std::vector<Index> deepest_of(const Vector& gaps, const ContactSet& set) {
   std::vector<Index> order;
   for (Index i = 0; i < gaps.size(); ++i)
-    if (gaps[i] < -slight) order.push_back(i);
+    if (gaps[i] < -projection_gap) order.push_back(i);
   std::sort(order.begin(), order.end(), [&](Index a, Index b) { return gaps[a] < gaps[b]; });
   std::vector<Index> chosen;
   for (const Index i : order) {
@@ -39,7 +39,7 @@ std::vector<Index> deepest_of(const Vector& gaps, const ContactSet& set) {
     const bool free = std::none_of(chosen.begin(), chosen.end(), [&](Index k) {
       return (place(i) - place(k)).squaredNorm() < apart * apart &&
              set.planes[static_cast<std::size_t>(i)].normal.dot(
-                 set.planes[static_cast<std::size_t>(k)].normal) > alike;
+                 set.planes[static_cast<std::size_t>(k)].normal) > parallel_cosine;
     });
     if (free) chosen.push_back(i);
     if (std::ssize(chosen) == planes_at_once) break;

@@ -16,7 +16,7 @@ namespace {
 /// Most refined points.
 constexpr Index most_finer = 12000;
 /// Refined points for the area of one sample, and their greatest distance from it, in sample spacings.
-constexpr double finer_density = 12.0, reach = 2.2;
+constexpr double finer_density = 12.0, finer_reach = 2.2;
 /// Least cosine between the normals of neighbours on the same side of the surface.
 constexpr double same_side = 0.5;
 /// How far beyond a sharp edge of the shape, in sample spacings, a refined point may lie.
@@ -72,7 +72,7 @@ Points ContactPoints::embedded_at(PointsIn places) const {
 const std::vector<Index>& ContactPoints::neighbours(Index sample) {
   const Index n = sample_count();
   if (!grid_) {
-    grid_ = std::make_unique<PointGrid>(rest_.topRows(n), 2.0 * reach * spacing_);
+    grid_ = std::make_unique<PointGrid>(rest_.topRows(n), 2.0 * finer_reach * spacing_);
     cells_ = grid_->cell_of_each();
   }
   std::vector<Index>& found = near_[static_cast<std::size_t>(sample)];
@@ -80,7 +80,7 @@ const std::vector<Index>& ContactPoints::neighbours(Index sample) {
   const Points& normals = problem_.samples.normals;
   const bool faces = normals.rows() == problem_.samples.size();
   const auto normal = [&](Index i) { return normals.row(samples_[static_cast<std::size_t>(i)]); };
-  const double square = 4.0 * reach * reach * spacing_ * spacing_;
+  const double square = 4.0 * finer_reach * finer_reach * spacing_ * spacing_;
   found.push_back(sample);
   grid_->near(cells_[static_cast<std::size_t>(sample)], [&](Index cell) {
     for (const Index i : grid_->rows(cell))
@@ -120,19 +120,19 @@ Points ContactPoints::finer(Index sample) {
   std::vector<Index> sides;  // nearby samples beyond a sharp edge
   grid_->near(cells_[static_cast<std::size_t>(sample)], [&](Index cell) {
     for (const Index i : grid_->rows(cell))
-      if ((rest_.row(i) - rest_.row(sample)).norm() < 2.0 * reach * spacing_ &&
+      if ((rest_.row(i) - rest_.row(sample)).norm() < 2.0 * finer_reach * spacing_ &&
           normal.dot(normal_at(i)) <= same_side)
         sides.push_back(i);
   });
   const auto off_the_surface = [&](const Vec3& place) {  // beyond a sharp edge
     return std::any_of(sides.begin(), sides.end(), [&](Index i) {
       const Vec3 arm = place - rest_.row(i).transpose();
-      return arm.norm() < reach * spacing_ && arm.dot(normal_at(i)) > over_edge * spacing_;
+      return arm.norm() < finer_reach * spacing_ && arm.dot(normal_at(i)) > over_edge * spacing_;
     });
   };
   std::vector<Vec3> places;
   const double density = finer_density / (spacing_ * spacing_);
-  const auto count = static_cast<int>(std::numbers::pi * reach * reach * finer_density);
+  const auto count = static_cast<int>(std::numbers::pi * finer_reach * finer_reach * finer_density);
   const double golden = std::numbers::pi * (3.0 - std::sqrt(5.0));
   for (int k = 1; k < count; ++k) {
     const double radius = std::sqrt(static_cast<double>(k) / (std::numbers::pi * density));

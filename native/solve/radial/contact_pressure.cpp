@@ -10,7 +10,7 @@ namespace {
 
 /// Penetration depths are clamped to this, in cube units, in multiplier updates: early iterates penetrate by
 /// more than their forces warrant.
-constexpr double shallow = 0.01;
+constexpr double deepest_counted = 0.01;
 /// Factors of the stiffness where depths do not decrease and where they do, and its maximum.
 constexpr double harder = 4.0, hardest = 3e6, softer = 0.25;
 /// Gap, in cube units, at which the mean pressure vanishes at most: the multiplier of a softer plane would
@@ -81,7 +81,7 @@ double ContactTerms::update_pressures(const double* places, const Vector& factor
   double change = 0.0, most = 0.0;
   for (ContactPlane& plane : found_.planes) {
     const double before = plane.pressure;
-    const double gap = std::max(-shallow, plane.gap(places));
+    const double gap = std::max(-deepest_counted, plane.gap(places));
     plane.pressure = factors[plane.obstacle] * plane.updated_pressure(gap, found_.stiffness);
     pressures_(found_.rows[static_cast<std::size_t>(plane.first)], plane.obstacle) = plane.pressure;
     change += plane.area * std::abs(plane.pressure - before);

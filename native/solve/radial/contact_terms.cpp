@@ -21,7 +21,7 @@ constexpr double slight = 2e-4;
 constexpr double farthest = 0.12;
 /// Least cosine of the nearest normal with the normal where the path entered, for both to be on one side of
 /// the obstacle: of a sheet, and of a solid, where sides that share an edge count as one.
-constexpr double same_side = 0.3, opposite = -0.5;
+constexpr double sheet_cosine = 0.3, solid_cosine = -0.5;
 /// The cosine of neighbouring planes' normals below which an obstacle has an edge between them.
 constexpr double smooth = 0.9;
 /// Safety distance in self-contact, twice that of obstacles: both sides are known at samples alone.
@@ -46,7 +46,7 @@ void go_back(const BarrierSurface& surface, PointsIn now, const std::vector<Inde
       offsets[i] *= -1.0;
     }
     if (nearest.distances[i] < reach &&
-        nearest.normals.row(i).dot(hit.normal) > (surface.is_sheet() ? same_side : opposite))
+        nearest.normals.row(i).dot(hit.normal) > (surface.is_sheet() ? sheet_cosine : solid_cosine))
       continue;
     if (beyond > 0.0 && nearest.distances[i] > 0.0) continue;  // the point went around the surface
     nearest.normals.row(i) = hit.normal.transpose();

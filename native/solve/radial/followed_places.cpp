@@ -21,13 +21,13 @@ constexpr Index most_samples = 14000;
 constexpr double stands_out = 1e-3;
 constexpr Index most_vertices = 4000;
 /// The random stream that chooses the samples.
-constexpr std::uint64_t stream = 3;
+constexpr std::uint64_t sample_stream = 3;
 
 }  // namespace
 
 FollowedPlaces::FollowedPlaces(const SurfaceSamples& surface, const std::vector<std::uint32_t>& order,
                                std::uint64_t seed, const Progress& progress) {
-  Random random(seed, stream);
+  Random random(seed, sample_stream);
   samples = stratified(order, std::min(most_samples, surface.size()), random);
   rest = rows_of(surface.points, samples);
   const double wide = 0.05;  // a cell holds about wide² of the surface's area

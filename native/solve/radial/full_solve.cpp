@@ -20,9 +20,12 @@ constexpr int steps_at_once = 10;
 /// A deformation has converged if `steps_at_once` iterations reduce the energy by less than this fraction.
 /// Thin parts under many held samples would take hundreds of iterations more for a gain of 1e-4.
 constexpr double least_gain = 1e-3;
+/// The same for a style, whose edges are still pulled straight for a while: half as many iterations more
+/// would gain 0.5 % at most.
+constexpr double least_style_gain = 5e-4;
 /// In contact it continues while they reduce the penetration depth, or the distance of handles that are held
 /// back, to less than these fractions.
-constexpr double still_comes_out = 0.8, still_slides = 0.98;
+constexpr double depth_share = 0.8, distance_share = 0.98;
 /// Increases of the energy that do not end it (contact planes that become active raise the energy), and
 /// checks at which the depth is above the tolerance without having fallen.
 constexpr int most_rises = 6, most_stays = 3;
@@ -114,9 +117,9 @@ class Convergence {
     const double gain = value_ - report.value;
     const double least = (contact.held.empty() ? 1.0 : less_where_held) * least_gain_ * report.value;
     const bool gains = report.iterations >= iterations && gain >= least;
-    const bool slides = held < still_slides * held_;
+    const bool slides = held < distance_share * held_;
     const bool rises = contact_ && gain <= -least && rises_++ < most_rises;
-    const bool comes_out = contact.deepest < still_comes_out * deepest_;
+    const bool comes_out = contact.deepest < depth_share * deepest_;
     value_ = report.value;
     deepest_ = contact.deepest;
     held_ = held;
@@ -285,7 +288,7 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   solver.set_style(style, options.strength, options.sharpness, weights, up);
   const Shown shown = [&] { return solver.field(); };
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity,
-                              shown, {.worst = quick.report().value});
+                              shown, {.worst = quick.report().value, .least_gain = least_style_gain});
   solver.set_hooks({hooks.energies, 1.0 / options.rigidity, {}});
   const bool ended = loop.stopped_by == StopReason::observer || loop.stopped_by == StopReason::time_budget;
   for (int round = 0; round < unfolding_rounds && options.surface.barrier > 0.0 && !ended; ++round) {

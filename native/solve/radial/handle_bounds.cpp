@@ -19,7 +19,7 @@ namespace {
 /// the tolerance of bounds, in cube units.
 constexpr std::size_t most_active = 40;
 constexpr int most_sweeps = 200;
-constexpr double settled = 1e-6;
+constexpr double bound_tolerance = 1e-6;
 /// A contact point is under a point handle if it is no farther from it than `under` at rest, nor than `aside`
 /// perpendicular to the plane's normal now, in widths of the shape there.
 constexpr double under = 1.5, aside = 0.35;
@@ -32,8 +32,8 @@ constexpr int thicker = 3;
 constexpr int most_times = 6;
 constexpr double unchanged = 1e-4;
 /// A plane is linearised anew if the translated point is within `near_bound` of it, in cube units, and the
-/// cosine of the new normal with the old one is at least `same_side`.
-constexpr double near_bound = 0.05, same_side = 0.0;
+/// cosine of the new normal with the old one is at least `least_turned`.
+constexpr double near_bound = 0.05, least_turned = 0.0;
 
 /// Weight of each handle: its number of points over its mean squared motion.
 Vector masses_of(const BoundHandles& handles) {
@@ -182,7 +182,7 @@ std::pair<Vec3, Index> HandleBounds::solve(const std::vector<Bound>& bounds) {
   std::vector<double> multipliers(bounds.size(), 0.0);
   std::vector<std::size_t> active;
   for (;;) {
-    double most = settled;
+    double most = bound_tolerance;
     std::size_t worst = bounds.size();
     for (std::size_t k = 0; k < bounds.size(); ++k)
       if (const double depth = bounds[k].depth - bounds[k].normal.dot(translation); depth > most)
@@ -191,8 +191,8 @@ std::pair<Vec3, Index> HandleBounds::solve(const std::vector<Bound>& bounds) {
         std::find(active.begin(), active.end(), worst) != active.end())
       break;
     active.push_back(worst);
-    double change = settled;
-    for (int sweep = 0; sweep < most_sweeps && change >= settled; ++sweep) {
+    double change = bound_tolerance;
+    for (int sweep = 0; sweep < most_sweeps && change >= bound_tolerance; ++sweep) {
       change = 0.0;
       for (const std::size_t k : active) {
         const double next =
@@ -231,7 +231,7 @@ bool HandleBounds::linearise_anew(std::vector<Bound>& bounds, const Vec3& transl
     for (std::size_t m = 0; m < of.size(); ++m) {
       const auto row = static_cast<Index>(m);
       const Vec3 normal = reflected(there.normals.row(row).transpose(), of[m]->mirrored);
-      if (normal.dot(of[m]->normal) < same_side) continue;
+      if (normal.dot(of[m]->normal) < least_turned) continue;
       of[m]->normal = normal;
       of[m]->depth =
           normal.dot(translation) - there.distances[row] + surface.margin() + ContactTerms::safety_distance;

@@ -15,7 +15,7 @@ constexpr Index most_sites = 6000;
 /// its median.
 constexpr double least_size = 0.1;
 /// The random stream that chooses the sites.
-constexpr std::uint64_t stream = 2;
+constexpr std::uint64_t site_stream = 2;
 
 }  // namespace
 
@@ -28,7 +28,7 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
   progress.check();
   thickness = std::make_shared<const LocalThickness>(samples.points, samples.normals, order);
   progress.check();
-  Random random(seed, stream);
+  Random random(seed, site_stream);
   std::vector<Index> chosen = stratified(order, most_sites, random);
   const std::vector<Index> missed = missed_rows(samples.points, chosen);
   chosen.insert(chosen.end(), missed.begin(), missed.end());
