@@ -9,7 +9,7 @@ import stage
 
 from .workflows import snapshot
 
-FRAMES, MILLISECONDS, REST = 12, 90, 400  # rendered, of one frame, of the ends
+FRAMES, MILLISECONDS, REST = 10, 108, 400  # rendered, of one frame, of the ends
 SAMPLES = 8  # a pixel: what moves hides what is left of the noise
 MOST = 2_000_000  # bytes a loop
 QUALITY = (92, 84, 72, 56)
