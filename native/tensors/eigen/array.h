@@ -10,6 +10,7 @@
 namespace arapfields {
 
 constexpr std::size_t most_dims = 6;
+inline std::size_t at_(Index i) { return static_cast<std::size_t>(i); }
 
 /// Rows of numbers `step` apart: what a loop over a tensor's numbers meets.
 using Extents = std::array<Index, most_dims>;

@@ -11,8 +11,6 @@
 namespace arapfields {
 namespace {
 
-std::size_t at_(Index i) { return static_cast<std::size_t>(i); }
-
 template <class F>
 Tensor unary(const Tensor& a, const F& f) {
   const Tensor result = empty_like(a);

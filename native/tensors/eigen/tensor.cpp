@@ -13,8 +13,6 @@
 namespace arapfields {
 namespace {
 
-std::size_t at_(Index i) { return static_cast<std::size_t>(i); }
-
 /// The same numbers under other sizes and strides.
 Tensor make_view(const Tensor::Array& of, const Extents& sizes, const Extents& strides, int dims,
                  Index offset = 0) {
