@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "tensors/operations.h"
@@ -10,7 +11,8 @@
 namespace arapfields {
 
 constexpr std::size_t most_dims = 6;
-inline std::size_t at_(Index i) { return static_cast<std::size_t>(i); }
+/// What standard containers are indexed with.
+inline std::size_t as_size(Index i) { return static_cast<std::size_t>(i); }
 
 /// Rows of numbers `step` apart: what a loop over a tensor's numbers meets.
 using Extents = std::array<Index, most_dims>;
@@ -64,7 +66,7 @@ void for_rows(const Tensor::Array& sizes, const std::array<Extents, operands>& s
   std::array<Level, most_dims> levels;  // the innermost first
   std::size_t depth = 0;
   for (int d = sizes.dims - 1; d >= 0; --d) {
-    const auto i = static_cast<std::size_t>(d);
+    const std::size_t i = as_size(d);
     if (sizes.sizes[i] == 0) return;
     if (sizes.sizes[i] == 1) continue;
     bool follows = depth > 0;

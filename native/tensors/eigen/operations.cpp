@@ -32,11 +32,11 @@ template <class F>
 Tensor reduce(const Tensor& a, SizeList dimensions, bool keep, double start, const F& f) {
   Extents kept = a.array().sizes, rest{};
   std::array<bool, most_dims> gone{};
-  for (const Index d : dimensions) gone[at_(wrapped(a, d))] = true;
+  for (const Index d : dimensions) gone[as_size(wrapped(a, d))] = true;
   int dims = 0;
-  for (std::size_t d = 0; d < at_(a.dims()); ++d) {
+  for (std::size_t d = 0; d < as_size(a.dims()); ++d) {
     if (gone[d]) kept[d] = 1;
-    if (!gone[d] || keep) rest[at_(dims++)] = kept[d];
+    if (!gone[d] || keep) rest[as_size(dims++)] = kept[d];
   }
   const Tensor sums = make_tensor(kept.data(), static_cast<int>(a.dims()), NumberType::float64);
   sums.fill(start);
@@ -76,7 +76,7 @@ Tensor make_broadcast(const Tensor& a, const Tensor& b, NumberType type) {
   for (int d = 0; d < dims; ++d) {
     const Index of_a = d - (dims - a.dims()), of_b = d - (dims - b.dims());
     const Index size_a = of_a < 0 ? 1 : a.size(of_a), size_b = of_b < 0 ? 1 : b.size(of_b);
-    sizes[at_(d)] = size_a == 1 ? size_b : size_a;
+    sizes[as_size(d)] = size_a == 1 ? size_b : size_a;
   }
   return make_tensor(sizes.data(), dims, type);
 }
@@ -207,7 +207,7 @@ Tensor stack(const std::vector<Tensor>& tensors, Index dimension) {
   const Tensor first = tensors.front().unsqueeze(dimension);
   Extents sizes = first.array().sizes;
   const Index d = dimension < 0 ? dimension + first.dims() : dimension;
-  sizes[at_(d)] = static_cast<Index>(tensors.size());
+  sizes[as_size(d)] = static_cast<Index>(tensors.size());
   const Tensor result = make_tensor(sizes.data(), static_cast<int>(first.dims()), first.type());
   for (std::size_t i = 0; i < tensors.size(); ++i) result.select(d, static_cast<Index>(i)).assign(tensors[i]);
   return result;
@@ -217,7 +217,7 @@ Tensor index_select(const Tensor& a, Index dimension, const Tensor& which) {
   const Tensor from = a.contiguous();
   const Index d = wrapped(a, dimension), inner = from.stride(d) * number_bytes(a.type());
   Extents sizes = a.array().sizes;
-  sizes[at_(d)] = which.count();
+  sizes[as_size(d)] = which.count();
   const Tensor result = make_tensor(sizes.data(), static_cast<int>(a.dims()), a.type());
   const Tensor rows = which.contiguous();
   const char* source = from.data<char>();
@@ -225,7 +225,7 @@ Tensor index_select(const Tensor& a, Index dimension, const Tensor& which) {
   const Index outer = result.count() == 0 ? 0 : result.count() / (which.count() * from.stride(d));
   for (Index o = 0; o < outer; ++o, source += a.size(d) * inner)
     for (Index i = 0; i < which.count(); ++i, to += inner)
-      std::memcpy(to, source + rows.data<Index>()[i] * inner, at_(inner));
+      std::memcpy(to, source + rows.data<Index>()[i] * inner, as_size(inner));
   return result;
 }
 

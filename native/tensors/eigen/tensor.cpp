@@ -74,13 +74,13 @@ Tensor make_tensor(const Index* sizes, int dims, NumberType type) {
   auto array = std::make_shared<Tensor::Array>();
   Index count = 1;
   for (int d = dims - 1; d >= 0; --d) {
-    array->sizes[at_(d)] = sizes[d];
-    array->strides[at_(d)] = count;
+    array->sizes[as_size(d)] = sizes[d];
+    array->strides[as_size(d)] = count;
     count *= sizes[d];
   }
   array->type = type;
   array->dims = dims;
-  const auto bytes = static_cast<std::size_t>(std::max<Index>(1, count * number_bytes(type)));
+  const std::size_t bytes = as_size(std::max<Index>(1, count * number_bytes(type)));
   array->owner = std::shared_ptr<void>(::operator new(bytes, alignment),
                                        [](void* memory) { ::operator delete(memory, alignment); });
   array->data = static_cast<char*>(array->owner.get());
@@ -90,9 +90,9 @@ Tensor make_tensor(const Index* sizes, int dims, NumberType type) {
 Extents strides_in(const Tensor::Array& a, const Tensor::Array& sizes) {
   Extents strides{};
   for (int d = sizes.dims - a.dims, i = 0; i < a.dims; ++d, ++i) {
-    if (d < 0 || (a.sizes[at_(i)] != 1 && a.sizes[at_(i)] != sizes.sizes[at_(d)]))
+    if (d < 0 || (a.sizes[as_size(i)] != 1 && a.sizes[as_size(i)] != sizes.sizes[as_size(d)]))
       throw std::invalid_argument("tensors whose sizes do not broadcast");
-    strides[at_(d)] = a.sizes[at_(i)] == 1 ? 0 : a.strides[at_(i)];
+    strides[as_size(d)] = a.sizes[as_size(i)] == 1 ? 0 : a.strides[as_size(i)];
   }
   return strides;
 }
@@ -110,17 +110,17 @@ bool Tensor::on_host() const { return true; }
 bool Tensor::is_contiguous() const {
   Index expected = 1;
   for (int d = array_->dims - 1; d >= 0; --d) {
-    if (array_->sizes[at_(d)] != 1 && array_->strides[at_(d)] != expected) return count() == 0;
-    expected *= array_->sizes[at_(d)];
+    if (array_->sizes[as_size(d)] != 1 && array_->strides[as_size(d)] != expected) return count() == 0;
+    expected *= array_->sizes[as_size(d)];
   }
   return true;
 }
 Index Tensor::dims() const { return array_->dims; }
-Index Tensor::size(Index dimension) const { return array_->sizes[at_(wrapped(*this, dimension))]; }
-Index Tensor::stride(Index dimension) const { return array_->strides[at_(wrapped(*this, dimension))]; }
+Index Tensor::size(Index dimension) const { return array_->sizes[as_size(wrapped(*this, dimension))]; }
+Index Tensor::stride(Index dimension) const { return array_->strides[as_size(wrapped(*this, dimension))]; }
 Index Tensor::count() const {
   Index count = 1;
-  for (int d = 0; d < array_->dims; ++d) count *= array_->sizes[at_(d)];
+  for (int d = 0; d < array_->dims; ++d) count *= array_->sizes[as_size(d)];
   return count;
 }
 void* Tensor::raw() const { return array_->data; }
@@ -131,7 +131,7 @@ double Tensor::number() const {
 }
 
 Tensor Tensor::narrow(Index dimension, Index begin, Index length) const {
-  const std::size_t d = at_(wrapped(*this, dimension));
+  const std::size_t d = as_size(wrapped(*this, dimension));
   if (begin < 0 || length < 0 || begin + length > array_->sizes[d])
     throw std::invalid_argument("a range beyond a tensor's size");
   Extents sizes = array_->sizes;
@@ -140,7 +140,7 @@ Tensor Tensor::narrow(Index dimension, Index begin, Index length) const {
 }
 
 Tensor Tensor::select(Index dimension, Index i) const {
-  const std::size_t d = at_(wrapped(*this, dimension));
+  const std::size_t d = as_size(wrapped(*this, dimension));
   if (i < 0 || i >= array_->sizes[d]) throw std::invalid_argument("an index beyond a tensor's size");
   Extents sizes = array_->sizes, strides = array_->strides;
   std::copy(sizes.begin() + d + 1, sizes.end(), sizes.begin() + d);
@@ -150,7 +150,7 @@ Tensor Tensor::select(Index dimension, Index i) const {
 
 Tensor Tensor::transpose(Index a, Index b) const {
   Extents sizes = array_->sizes, strides = array_->strides;
-  const std::size_t i = at_(wrapped(*this, a)), j = at_(wrapped(*this, b));
+  const std::size_t i = as_size(wrapped(*this, a)), j = as_size(wrapped(*this, b));
   std::swap(sizes[i], sizes[j]);
   std::swap(strides[i], strides[j]);
   return make_view(*array_, sizes, strides, array_->dims);
@@ -159,14 +159,14 @@ Tensor Tensor::transpose(Index a, Index b) const {
 Tensor Tensor::permute(SizeList order) const {
   Extents sizes{}, strides{};
   for (std::size_t d = 0; d < order.size(); ++d) {
-    sizes[d] = array_->sizes[at_(order.begin()[d])];
-    strides[d] = array_->strides[at_(order.begin()[d])];
+    sizes[d] = array_->sizes[as_size(order.begin()[d])];
+    strides[d] = array_->strides[as_size(order.begin()[d])];
   }
   return make_view(*array_, sizes, strides, array_->dims);
 }
 
 Tensor Tensor::unsqueeze(Index dimension) const {
-  const std::size_t d = at_(dimension < 0 ? dimension + dims() + 1 : dimension);
+  const std::size_t d = as_size(dimension < 0 ? dimension + dims() + 1 : dimension);
   Extents sizes = array_->sizes, strides = array_->strides;
   std::copy_backward(sizes.begin() + d, sizes.end() - 1, sizes.end());
   std::copy_backward(strides.begin() + d, strides.end() - 1, strides.end());
@@ -202,7 +202,7 @@ Tensor Tensor::view_like(const Tensor& other) const {
   const Array& to = other.array();
   Extents strides{};
   Index product = 1;
-  for (int d = to.dims - 1; d >= 0; product *= to.sizes[at_(d--)]) strides[at_(d)] = product;
+  for (int d = to.dims - 1; d >= 0; product *= to.sizes[as_size(d--)]) strides[as_size(d)] = product;
   return make_view(*array_, to.sizes, strides, to.dims);
 }
 
