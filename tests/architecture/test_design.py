@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limits that single files do not show: circles, classes over several sources, declarations of several."""
+"""Rules that single files do not show: circles, names defined twice, declarations of several names."""
 
 import ast
 import re
@@ -12,8 +12,6 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 NATIVE = ROOT / "native"
 PACKAGES = [ROOT / "addon", NATIVE / "python" / "arapfields"]
-# A class is as long as its parts in all sources together, and that is what one file may be.
-LONGEST = {"C++": 350, "Python": 250}
 LISTS = 65  # declarations of several members or functions that native headers have today: only fewer
 
 
@@ -61,46 +59,6 @@ def test_no_two_headers_define_one_name():
     names = Counter(found for defined in headers.values() for found in defined)
     assert len(names) > 150
     assert not {found for found, times in names.items() if times > 1}
-
-
-def native_lengths():
-    """Lines of the definitions of each class's functions, over all sources."""
-    lines = Counter()
-    for path in NATIVE.rglob("*.cpp"):
-        owner = None
-        for line in path.read_text().splitlines():
-            if line[:1] not in " \t}#/":
-                found = re.match(r"[^=;]*?\b([A-Z]\w*(?:::[A-Z]\w*)*)(?:<[^()]*>)?::~?\w+\(", line)
-                owner = found[1] if found else owner
-            if owner:
-                lines[owner] += 1
-            owner = None if line.startswith("}") else owner
-    return lines
-
-
-def python_lengths():
-    """Lines of each class of the add-on, with those of the mixins that no other class has."""
-    classes, users = {}, Counter()
-    for path in PACKAGES[0].rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ClassDef):
-                bases = [getattr(base, "id", getattr(base, "attr", "")) for base in node.bases]
-                classes[node.name] = node.end_lineno - node.lineno + 1, bases
-                users.update(bases)
-
-    def length(name):
-        own, bases = classes[name]
-        return own + sum(length(base) for base in bases if base in classes and users[base] == 1)
-
-    return {name: length(name) for name in classes}
-
-
-@pytest.mark.parametrize("language", LONGEST)
-def test_a_class_over_several_sources_counts_as_one(language):
-    lengths = native_lengths() if language == "C++" else python_lengths()
-    assert len(lengths) > 50
-    too_long = {n: k for n, k in lengths.items() if k > LONGEST[language]}
-    assert not too_long, too_long
 
 
 SCOPE = re.compile(
