@@ -35,7 +35,7 @@ endif
 NATIVE_TESTS := $(BUILD)/tests/native_tests
 export ARAPFIELDS_NATIVE_TESTS := $(NATIVE_TESTS)
 
-.PHONY: help setup build examples demo test test-slow test-windows test-arm64 fuzz bench sanitize format lint wheels workflows extension release blenders gallery docs clean
+.PHONY: help setup build examples demo test test-slow test-windows test-arm64 fuzz fuzz-contact bench sanitize format lint wheels workflows extension release blenders gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -161,6 +161,15 @@ sanitize: setup  ## the native tests under the address and undefined-behaviour s
 	$(SANITIZED) -B build/sanitize-thread -DARAPFIELDS_SANITIZE=thread -DARAPFIELDS_BACKEND=eigen -DARAPFIELDS_PYTHON=OFF
 	$(VENV)/bin/cmake --build build/sanitize-thread --target native_tests
 	build/sanitize-thread/tests/native_tests --run_test=threads,live_threads --run_test='!@fork'
+
+# The Eigen backend, which the sanitizers see into.
+SCENES := 2000
+FIRST := 0
+fuzz-contact: setup  ## 2,000 random scenes in contact under the address and undefined-behaviour sanitizers; SCENES=count FIRST=number: others
+	$(COMPILER)
+	$(SANITIZED) -B build/sanitize-eigen -DARAPFIELDS_SANITIZE=address,undefined -DARAPFIELDS_BACKEND=eigen -DARAPFIELDS_PYTHON=OFF
+	$(VENV)/bin/cmake --build build/sanitize-eigen --target native_tests
+	UBSAN_OPTIONS=print_stacktrace=1 ARAPFIELDS_CONTACT_SCENES="$(FIRST) $(SCENES)" build/sanitize-eigen/tests/native_tests --run_test=contact_scenes
 
 # What these words read from git; an unpacked archive has none.
 .PHONY: git-clone

@@ -29,8 +29,12 @@ if(ARAPFIELDS_WERROR)
 endif()
 if(ARAPFIELDS_SANITIZE)
   target_compile_options(arapfields_options INTERFACE
-    -fsanitize=${ARAPFIELDS_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -g)
+    -fsanitize=${ARAPFIELDS_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -g1 -O1)
   target_link_options(arapfields_options INTERFACE -fsanitize=${ARAPFIELDS_SANITIZE})
+  # The assertions of Eigen and of the standard library see what stays within an array's memory; a number that was
+  # never set is NaN.
+  target_compile_options(arapfields_options INTERFACE -UNDEBUG)
+  target_compile_definitions(arapfields_options INTERFACE _GLIBCXX_ASSERTIONS EIGEN_INITIALIZE_MATRICES_BY_NAN)
 endif()
 
 # For the library's own sources, beside those of bindings: what the headers mark is theirs to export.

@@ -25,6 +25,37 @@ inline TriangleMesh torus(int rings, int sides, double major = 1.0, double minor
   return mesh;
 }
 
+/// A round bar along x, closed at its ends, with flat sides.
+inline TriangleMesh bar(double length, double width, int cells) {
+  constexpr int sides = 12;
+  TriangleMesh mesh{Points((cells + 1) * sides, 3), Triangles(2 * cells * sides, 3)};
+  for (int i = 0; i <= cells; ++i) {
+    const double x = 2.0 * i / cells - 1.0, radius = width * (1.0 - std::pow(x, 12.0));
+    for (int k = 0; k < sides; ++k) {
+      const double turn = 2.0 * std::numbers::pi * k / sides;
+      mesh.vertices.row(i * sides + k) << 0.5 * length * x, radius * std::cos(turn), radius * std::sin(turn);
+    }
+  }
+  for (int i = 0; i < cells; ++i)
+    for (int k = 0; k < sides; ++k) {
+      const int a = i * sides + k, b = i * sides + (k + 1) % sides;
+      mesh.triangles.row(2 * a) << a, b, b + sides;
+      mesh.triangles.row(2 * a + 1) << a, b + sides, a + sides;
+    }
+  return mesh;
+}
+
+inline TriangleMesh box_mesh(const Vec3& half, const Vec3& center) {
+  TriangleMesh mesh{Points(8, 3), Triangles(12, 3)};
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 corner((i & 1) ? 1 : -1, (i & 2) ? 1 : -1, (i & 4) ? 1 : -1);
+    mesh.vertices.row(i) = (center + half.cwiseProduct(corner)).transpose();
+  }
+  mesh.triangles << 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2,
+      1, 3, 7, 1, 7, 5;
+  return mesh;
+}
+
 /// Triangles with corners anywhere in a cube; every fifth is a line, every seventh a point, every eleventh
 /// its forerunner once more.
 inline TriangleMesh soup(int count, std::uint64_t seed) {

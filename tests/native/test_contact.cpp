@@ -2,13 +2,57 @@
 #include <array>
 #include <boost/test/unit_test.hpp>
 #include <cmath>
+#include <functional>
+#include <stdexcept>
 #include <vector>
 
+#include "core/errors.h"
 #include "core/random.h"
+#include "distance/mesh_sdf.h"
 #include "energies/contact.h"
+#include "implicit_shapes.h"
+#include "mesh/sample_mesh.h"
+#include "shapes.h"
 #include "solve/radial/contact_rows.h"
+#include "solve/radial/contact_terms.h"
+#include "solve/radial/radial_solver.h"
 
 using namespace arapfields;
+
+namespace {
+
+SurfaceSamples bar_samples(std::uint64_t seed = 0) {
+  const TriangleMesh mesh = shapes::bar(2.0, 0.2, 24);
+  return sample_mesh(mesh.vertices, mesh.triangles, 800, seed);
+}
+
+LiveOptions few_centers() {
+  LiveOptions options;
+  options.samples = 200;
+  options.coarse_centers = 0;
+  options.fine_centers = 40;
+  options.threads = 1;
+  return options;
+}
+
+/// A block with edges beside the bar's lower side, where contact points are refined.
+Contact block_below() {
+  const TriangleMesh mesh = shapes::box_mesh({0.1, 0.3, 0.1}, {0.0, 0.0, -0.31});
+  Contact contact;
+  contact.obstacles.push_back({std::make_shared<MeshSdf>(mesh.vertices, mesh.triangles), 0.02});
+  return contact;
+}
+
+/// Positions of the planes' points.
+Points rows_at(const ContactTerms& contact) {
+  const Points places = contact.snapshot().history.places;
+  Points result(std::ssize(contact.found().rows), 3);
+  for (Index i = 0; i < result.rows(); ++i)
+    result.row(i) = places.row(contact.found().rows[static_cast<std::size_t>(i)]);
+  return result;
+}
+
+}  // namespace
 
 BOOST_AUTO_TEST_SUITE(contact)
 
@@ -91,6 +135,91 @@ BOOST_AUTO_TEST_CASE(forces_are_complementary_to_gaps) {
       BOOST_TEST(gaps.minCoeff() > -1e-9 * size);
       BOOST_TEST(forces.cwiseProduct(gaps).cwiseAbs().maxCoeff() < 1e-9 * size * size);
     }
+}
+
+BOOST_AUTO_TEST_CASE(a_snapshot_brings_its_own_points_back) {
+  const RadialProblem problem(bar_samples(), few_centers(), {}, nullptr, nullptr);
+  const RowMatrix<double> rest = problem.basis.identity();
+  ContactTerms contact(problem);
+  contact.set(block_below(), rest);
+  const ContactSnapshot coarse = [&] {
+    contact.begin(rest);
+    return contact.snapshot();
+  }();
+  const double depth = contact.find(rest);
+  BOOST_TEST(depth > 0.0);
+  contact.update_pressures(rows_at(contact).data(), Vector::Ones(contact.surface_count()));
+  const ContactSnapshot fine = contact.snapshot();
+  const Index points = fine.history.places.rows();
+  BOOST_TEST(fine.history.refined.size() > 10u);
+  BOOST_TEST(coarse.history.refined.empty());
+  BOOST_TEST(points > coarse.history.places.rows());
+  BOOST_TEST(fine.history.pressures.maxCoeff() > 0.0);
+  RowMatrix<double> away = rest;
+  away.row(problem.basis.center_count())[2] += 0.5;
+  for (int time = 0; time < 2; ++time) {  // from fewer points, and from as many
+    contact.begin(away);
+    contact.find(away);
+    BOOST_TEST(contact.snapshot().history.refined.empty());
+    BOOST_TEST(contact.restore(fine, rest) == depth);
+    const ContactSnapshot back = contact.snapshot();
+    BOOST_TEST((back.history.refined == fine.history.refined));
+    BOOST_TEST((back.history.pressures == fine.history.pressures));
+    BOOST_TEST((back.history.sides.clearance.rows() == points && back.history.places.rows() == points));
+    BOOST_TEST(std::ssize(contact.found().rows) <= points);
+    contact.restore(coarse, away);
+    BOOST_TEST(contact.snapshot().history.places.rows() == coarse.history.places.rows());
+    contact.restore(fine, rest);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_search_that_fails_leaves_whole_contact) {
+  const RadialProblem problem(bar_samples(), few_centers(), {}, nullptr, nullptr);
+  const RowMatrix<double> rest = problem.basis.identity();
+  bool fails = false;
+  const auto below = [&fails](const Vec3& x) {
+    if (fails) throw std::runtime_error("fails");
+    return x[2] + 0.19;
+  };
+  Contact given = block_below();
+  given.obstacles.push_back({std::make_shared<shapes::Analytic>(below)});
+  ContactTerms contact(problem);
+  contact.set(given, rest);
+  const double depth = contact.find(rest);
+  const std::size_t planes = contact.found().planes.size();
+  BOOST_TEST(planes > 0u);
+  Contact with_another = given;
+  with_another.obstacles.back().function = std::make_shared<shapes::Analytic>(below);
+  RowMatrix<double> lower = rest;
+  lower.row(problem.basis.center_count())[2] -= 0.01;
+  for (const auto& call :
+       std::vector<std::function<void()>>{[&] { contact.find(lower); }, [&] { contact.begin(lower); },
+                                          [&] { contact.set(with_another, lower); }}) {
+    fails = true;
+    BOOST_CHECK_THROW(call(), std::runtime_error);
+    fails = false;
+    for (const ContactPlane& plane : contact.found().planes)
+      BOOST_TEST(plane.first < std::ssize(contact.found().rows));
+    BOOST_TEST(contact.find(lower) > 0.0);
+    contact.begin(rest);
+    BOOST_TEST(contact.find(rest) == depth);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(a_motion_state_of_other_samples_is_refused) {
+  Handle held;
+  held.rest.diagonal() << 0.3, 1.0, 1.0, 1.0;
+  held.rest(0, 3) = -0.9;
+  held.target = held.rest;
+  RadialSolver one(bar_samples(0), {held}, few_centers()), other(bar_samples(1), {held}, few_centers());
+  for (RadialSolver* solver : {&one, &other}) {
+    solver->set_contact(block_below());
+    solver->set_secondary_motion(SecondaryMotion{});
+    solver->step({held}, 0.01);
+  }
+  BOOST_CHECK_THROW(other.set_motion_state(one.motion_state()), InvalidInput);
+  other.step({held}, 0.01);
+  one.set_motion_state(one.motion_state());
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -51,15 +51,14 @@ void ContactApproach::find_and_push(int pushes, double from) {
   s.objective(s.fast);
   for (int push = 0; push < pushes && depth > deep && depth < from; ++push) {
     const RowMatrix<double> before = s.shape.coefficients;
-    const ContactSides sides = s.contact.sides();
+    ContactSnapshot snapshot = s.contact.snapshot();
     push_out(s);
     const double next = s.contact.find(s.shape.coefficients);
     const bool worse = next >= depth;
     if (worse) {
       s.shape.coefficients = before;
       ++s.shape.revision;
-      s.contact.set_sides(sides);
-      s.contact.find(s.shape.coefficients);
+      s.contact.restore(std::move(snapshot), s.shape.coefficients);
     }
     s.objective(s.fast);
     if (worse) break;
@@ -75,15 +74,14 @@ bool ContactApproach::solve_round(const RowMatrix<double>& before, Index iterati
   const double allowed = std::max(too_deep, s.contact.deepest());
   const bool converged = s.descend(s.fast, {iterations, tolerance_, floor}, progress_).converged;
   update_balanced_pressures(s);
-  const ContactSides sides = s.contact.sides();
+  const ContactSnapshot snapshot = s.contact.snapshot();
   double depth = s.contact.find(s.shape.coefficients, std::nullopt);
   bool back = false;
   for (int half = 0; half < most_halves && depth > allowed; ++half) {
     back = true;
     s.shape.coefficients = 0.5 * (s.shape.coefficients + before);
     ++s.shape.revision;
-    s.contact.set_sides(sides);
-    depth = s.contact.find(s.shape.coefficients);
+    depth = s.contact.restore(snapshot, s.shape.coefficients);
   }
   return converged && !back;
 }

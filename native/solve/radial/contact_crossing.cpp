@@ -177,7 +177,7 @@ void ContactSides::begin_beside_crossings(Index surface, const BarrierSurface& o
                                           const std::vector<Index>& samples, PointsIn places) {
   std::vector<Index> rows;
   const Index first = clearance.rows() - std::ssize(samples);
-  for (Index row = first; row < std::min(clearance.rows(), places.rows()); ++row)
+  for (Index row = first; row < clearance.rows(); ++row)
     if (crosses(surface, samples[static_cast<std::size_t>(row - first)])) rows.push_back(row);
   if (rows.empty()) return;
   const Points begun = rows_of(places, rows);

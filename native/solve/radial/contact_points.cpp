@@ -2,6 +2,7 @@
 #include "solve/radial/contact_points.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -91,9 +92,15 @@ const std::vector<Index>& ContactPoints::neighbours(Index sample) {
   return found;
 }
 
+/// The refined points of a sample, always the same.
+const Points& ContactPoints::finer(Index sample) {
+  const auto known = made_.find(sample);
+  return known != made_.end() ? known->second : made_.emplace(sample, made_finer(sample)).first->second;
+}
+
 /// Points of a golden-angle spiral in the tangent plane within the sample's Voronoi cell, lifted to the
 /// quadratic height field that fits its neighbours.
-Points ContactPoints::finer(Index sample) {
+Points ContactPoints::made_finer(Index sample) {
   const Vec3 at = rest_.row(sample).transpose();
   const auto normal_at = [&](Index i) -> Vec3 {
     return problem_.samples.normals.row(samples_[static_cast<std::size_t>(i)]).transpose().normalized();
@@ -154,28 +161,48 @@ void ContactPoints::refine(const std::vector<Index>& samples) {
   const Index known = rest_.rows();
   for (const Index sample : samples) {
     if (is_fine_[static_cast<std::size_t>(sample)] || size() - coarse_ > most_finer) continue;
+    const Points& more = finer(sample);
     is_fine_[static_cast<std::size_t>(sample)] = true;
-    const Points more = finer(sample);
-    ++finer_places_;
     const Index before = rest_.rows();
     rest_.conservativeResize(before + more.rows(), Eigen::NoChange);
     rest_.bottomRows(more.rows()) = more;
     parents_.insert(parents_.end(), static_cast<std::size_t>(more.rows()), sample);
+    refined_.push_back(sample);
+    ends_.push_back(rest_.rows());
   }
+  if (rest_.rows() == known) return;
+  ++finer_places_;
   const Points more = embedded_at(rest_.bottomRows(rest_.rows() - known));
   if (more.rows() == 0) return;
   embedded_.conservativeResize(rest_.rows(), Eigen::NoChange);
   embedded_.bottomRows(more.rows()) = more;
 }
 
-void ContactPoints::coarsen() {
-  if (std::find(is_fine_.begin(), is_fine_.end(), true) == is_fine_.end()) return;
-  parents_.resize(static_cast<std::size_t>(coarse_ - sample_count()));
-  ++finer_places_;
-  is_fine_.assign(samples_.size(), false);
-  rest_.conservativeResize(coarse_, Eigen::NoChange);
-  if (embedded_.rows() > 0) embedded_.conservativeResize(coarse_, Eigen::NoChange);
-  places_.conservativeResize(std::min<Index>(places_.rows(), coarse_), Eigen::NoChange);
+void ContactPoints::set_refined(const std::vector<Index>& samples) {
+  const auto [end, other] = std::mismatch(refined_.begin(), refined_.end(), samples.begin(), samples.end());
+  const std::ptrdiff_t kept = end - refined_.begin();
+  if (end != refined_.end()) {
+    const Index rows = kept > 0 ? ends_[static_cast<std::size_t>(kept) - 1] : coarse_;
+    for (auto sample = end; sample != refined_.end(); ++sample)
+      is_fine_[static_cast<std::size_t>(*sample)] = false;
+    refined_.resize(static_cast<std::size_t>(kept));
+    ends_.resize(static_cast<std::size_t>(kept));
+    parents_.resize(static_cast<std::size_t>(rows - sample_count()));
+    rest_.conservativeResize(rows, Eigen::NoChange);
+    if (embedded_.rows() > 0) embedded_.conservativeResize(rows, Eigen::NoChange);
+    places_.conservativeResize(std::min<Index>(places_.rows(), rows), Eigen::NoChange);
+    ++finer_places_;
+  }
+  refine({samples.begin() + kept, samples.end()});
+}
+
+/// FNV-1a.
+std::uint64_t ContactPoints::identity() const {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  const double* numbers = rest_.data();
+  for (Index i = 0; i < 3 * coarse_; ++i)
+    hash = (hash ^ std::bit_cast<std::uint64_t>(numbers[i])) * 0x100000001b3u;
+  return hash;
 }
 
 const Points& ContactPoints::at(const RowMatrix<double>& coefficients) {
@@ -183,19 +210,22 @@ const Points& ContactPoints::at(const RowMatrix<double>& coefficients) {
   if (!is_at(coefficients)) places_.resize(0, 3);
   coefficients_ = coefficients;
   const Index known = places_.rows();
-  places_.conservativeResize(all, Eigen::NoChange);
+  if (known == all) return places_;
+  Points places(all, 3);
+  places.topRows(known) = places_;
   const auto fill = [&](Dependent<RadialEvaluator<float>, 1>& made, Revision of, Index first, Index count) {
     const RadialEvaluator<float>& evaluator = made.get({of}, [&] {
       const Points embedded = embedded_.middleRows(first, embedded_.rows() > 0 ? count : 0);
       return RadialEvaluator<float>(problem_.basis, rest_.middleRows(first, count), JetOrder::value,
                                     embedded.rows() > 0 ? &embedded : nullptr);
     });
-    PointsF places(count, 3);
-    evaluator.evaluate(coefficients, {places.data(), count, JetOrder::value});
-    places_.middleRows(first, count) = places.cast<double>();
+    PointsF values(count, 3);
+    evaluator.evaluate(coefficients, {values.data(), count, JetOrder::value});
+    places.middleRows(first, count) = values.cast<double>();
   };
   if (known < n) fill(evaluator_, 1, 0, n);
-  if (all > std::max(n, known)) fill(finer_, finer_places_, n, all - n);
+  if (all > n) fill(finer_, finer_places_, n, all - n);
+  places_ = std::move(places);
   return places_;
 }
 

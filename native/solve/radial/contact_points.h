@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -39,10 +41,14 @@ class ContactPoints {
   double spacing() const { return spacing_; }
   /// Samples near one at rest whose normals are on the same side; the sample itself is the first.
   const std::vector<Index>& neighbours(Index sample);
+  /// The samples that have refined points, in the order of these points: says which points there are.
+  const std::vector<Index>& refined() const { return refined_; }
   /// Adds refined points around samples that have none yet.
   void refine(const std::vector<Index>& samples);
-  /// Removes all refined points.
-  void coarsen();
+  /// Gives these samples alone refined points; they were refined() before.
+  void set_refined(const std::vector<Index>& samples);
+  /// A hash of the rest positions of samples and vertices: equal for solvers on the same samples.
+  std::uint64_t identity() const;
 
   /// Positions (size(),3) under the field with these coefficients; cached.
   const Points& at(const RowMatrix<double>& coefficients);
@@ -55,14 +61,18 @@ class ContactPoints {
   Points normals_at(const RowMatrix<double>& coefficients, const std::vector<Index>* blocks = nullptr);
 
  private:
-  Points finer(Index sample);
+  const Points& finer(Index sample);
+  Points made_finer(Index sample);
   Points embedded_at(PointsIn places) const;
 
   const RadialProblem& problem_;
   std::vector<Index> samples_;
   std::vector<Index> parents_;  // the sample of each vertex and refined point
   Index coarse_ = 0;
-  std::vector<bool> is_fine_;  // whether a sample has refined points
+  std::vector<Index> refined_;
+  std::vector<Index> ends_;       // of the refined points of each of `refined_`
+  std::vector<bool> is_fine_;     // whether a sample is one of `refined_`
+  std::map<Index, Points> made_;  // refined points of each sample that ever had some
   Points rest_;
   Points embedded_;  // rest_ in the basis' interior embedding
   double spacing_ = 0.0;

@@ -28,26 +28,29 @@ double nearness(const double* places, Index row, const Vec3& place) {
 
 }  // namespace
 
-/// Collects the points of the planes, once each, and lets the planes index them.
-void ContactTerms::gather_places() {
+/// Replaces the planes. Collects their points, once each, and lets the planes index them.
+void ContactTerms::set_planes(std::vector<ContactPlane> planes) {
   std::vector<Index> place(static_cast<std::size_t>(points_.size()), -1);
   const auto of = [&](Index row) -> Index& { return place[static_cast<std::size_t>(row)]; };
-  for (const ContactPlane& plane : found_.planes)
+  for (const ContactPlane& plane : planes)
     for (const Index row : {plane.first, plane.second})
       if (row >= 0) of(row) = 0;
-  found_.rows.clear();
+  std::vector<Index> rows;
   for (Index row = 0; row < points_.size(); ++row) {
     if (of(row) < 0) continue;
-    of(row) = std::ssize(found_.rows);
-    found_.rows.push_back(row);
+    of(row) = std::ssize(rows);
+    rows.push_back(row);
   }
-  found_.places = points_.rest(found_.rows);
-  found_.embedded = points_.embedded(found_.rows);
-  for (ContactPlane& plane : found_.planes) {
+  found_.places = points_.rest(rows);
+  found_.embedded = points_.embedded(rows);
+  for (ContactPlane& plane : planes) {
     plane.first = of(plane.first);
     if (plane.second >= 0) plane.second = of(plane.second);
   }
+  found_.rows = std::move(rows);
+  found_.planes = std::move(planes);
   found_.revision = found_.planes.empty() ? 0 : ++sets_;
+  has_friction_ = false;
 }
 
 Index ContactTerms::sample_of(Index place) const {
@@ -83,7 +86,7 @@ double ContactTerms::update_pressures(const double* places, const Vector& factor
     const double before = plane.pressure;
     const double gap = std::max(-deepest_counted, plane.gap(places));
     plane.pressure = factors[plane.obstacle] * plane.updated_pressure(gap, found_.stiffness);
-    pressures_(found_.rows[static_cast<std::size_t>(plane.first)], plane.obstacle) = plane.pressure;
+    history_->pressures(found_.rows[static_cast<std::size_t>(plane.first)], plane.obstacle) = plane.pressure;
     change += plane.area * std::abs(plane.pressure - before);
     most += plane.area * std::max(plane.pressure, before);
   }

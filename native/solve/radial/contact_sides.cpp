@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/errors.h"
 #include "solve/radial/contact_terms.h"
 #include "solve/radial/handle_motion.h"
 
@@ -19,72 +20,86 @@ void note_inside(Index k, const Points& places, const Points& outside, const Vec
       state.inside.push_back({row, k, outside.row(row).transpose(), clearance[row]});
 }
 
-void recall_inside(const ContactState& state, std::vector<Points>& outside, RowMatrix<double>& clearance) {
-  for (const ContactState::Inside& held : state.inside)
-    if (held.row < clearance.rows() && held.surface < clearance.cols()) {
-      outside[static_cast<std::size_t>(held.surface)].row(held.row) = held.outside.transpose();
-      clearance(held.row, held.surface) = held.clearance;
-    }
+void recall_inside(const ContactState& state, ContactSides& sides) {
+  for (const ContactState::Inside& held : state.inside) {
+    sides.outside[static_cast<std::size_t>(held.surface)].row(held.row) = held.outside.transpose();
+    sides.clearance(held.row, held.surface) = held.clearance;
+  }
 }
 
 }  // namespace
 
+ContactSides::ContactSides(Index points, std::size_t surfaces)
+    : outside(surfaces),
+      anchors(surfaces),
+      clearance(points, static_cast<Index>(surfaces)),
+      crossed(surfaces) {}
+
+void ContactSides::start(Index surface, const BarrierSurface& obstacle, PointsIn places) {
+  const auto k = static_cast<std::size_t>(surface);
+  outside[k] = anchors[k] = places;
+  clearance.col(surface) = obstacle.distances(places);
+  crossed[k].clear();
+}
+
+void ContactTerms::require_own(const ContactState& state) const {
+  require(!any() || state.points == 0 || state.points == points_.identity(), "state",
+          "of the contact of other samples",
+          "one that this solver, or one with the same samples, gave is needed");
+}
+
 void ContactTerms::resume(const ContactState& state, const RowMatrix<double>& coefficients) {
-  sides_ = {};
-  if (!any()) return release();
-  points_.coarsen();
-  places_ = points_.at(coefficients);
-  if (self_) self_->begin(places_, [&](auto* blocks) { return points_.normals_at(coefficients, blocks); });
-  const Index count = std::ssize(surfaces_);
-  const bool fits = std::ssize(state.placements) == count;
-  sides_.outside.resize(surfaces_.size());
-  sides_.anchors.resize(surfaces_.size());
-  sides_.crossed.resize(surfaces_.size());
-  sides_.clearance.resize(places_.rows(), count);
-  pressures_.resize(places_.rows(), count + 1);
-  for (Index k = 0; k < count; ++k) {
-    const auto which = static_cast<std::size_t>(k);
-    surfaces_[which].set_placement(fits ? state.placements[which] : ends_[which]);
-    start_tracking(k);
-    if (!fits) sides_.find_crossings(k, surfaces_[which], points_, places_);
+  require_own(state);
+  forget();
+  if (!any()) return;
+  points_.set_refined({});
+  ContactHistory next;
+  next.places = points_.at(coefficients);
+  next.sides = ContactSides(next.places.rows(), surfaces_.size());
+  next.pressures.setZero(next.places.rows(), surface_count());
+  if (self_)
+    next.itself = self_->begin(samples_of(next.places),
+                               [&](auto* blocks) { return points_.normals_at(coefficients, blocks); });
+  const bool fits = state.placements.size() == surfaces_.size();
+  for (Index k = 0; k < std::ssize(surfaces_); ++k) {
+    BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
+    surface.set_placement((fits ? state.placements : ends_)[static_cast<std::size_t>(k)]);
+    next.sides.start(k, surface, next.places);
+    if (!fits) next.sides.find_crossings(k, surface, points_, next.places);
   }
-  if (fits) {
-    recall_inside(state, sides_.outside, sides_.clearance);
-    sides_.crossed = state.crossed;
-    sides_.crossed.resize(surfaces_.size());
+  if (fits && state.points != 0) {
+    recall_inside(state, next.sides);
+    next.sides.crossed = state.crossed;
+    for (const ContactState::Pressure& held : state.pressures) {
+      next.pressures(held.row, held.surface) = held.pressure;
+      if (held.surface < std::ssize(surfaces_))
+        next.sides.anchors[static_cast<std::size_t>(held.surface)].row(held.row) = held.anchor.transpose();
+    }
   }
   starts_ = fits ? state.placements : ends_;
   obstacle_motions_.assign(surfaces_.size(), Mat4::Identity());
-  release();
-  known_ = false;
-  for (const ContactState::Pressure& held : state.pressures)
-    if (held.row < pressures_.rows() && held.surface < pressures_.cols()) {
-      pressures_(held.row, held.surface) = held.pressure;
-      if (held.surface < count)
-        sides_.anchors[static_cast<std::size_t>(held.surface)].row(held.row) = held.anchor.transpose();
-    }
-}
-
-/// Starts the tracking of a surface's sides at the current places.
-void ContactTerms::start_tracking(Index k) {
-  sides_.outside[static_cast<std::size_t>(k)] = sides_.anchors[static_cast<std::size_t>(k)] = places_;
-  sides_.clearance.col(k) = surfaces_[static_cast<std::size_t>(k)].distances(places_);
+  history_ = std::move(next);
 }
 
 ContactState ContactTerms::state() const {
   ContactState state;
   for (const BarrierSurface& surface : surfaces_) state.placements.push_back(surface.placement());
-  for (Index row = 0; row < std::min<Index>(pressures_.rows(), points_.coarse_count()); ++row)
-    for (Index k = 0; k < pressures_.cols(); ++k)
-      if (pressures_(row, k) > 0.0) {
+  if (!history_) return state;
+  const ContactHistory& history = *history_;
+  const Index count = points_.coarse_count();
+  state.points = points_.identity();
+  for (Index row = 0; row < count; ++row)
+    for (Index k = 0; k < history.pressures.cols(); ++k)
+      if (history.pressures(row, k) > 0.0) {
         const Points& of =
-            k < std::ssize(sides_.anchors) ? sides_.anchors[static_cast<std::size_t>(k)] : places_;
-        state.pressures.push_back({row, k, pressures_(row, k), of.row(row).transpose()});
+            k < std::ssize(surfaces_) ? history.sides.anchors[static_cast<std::size_t>(k)] : history.places;
+        state.pressures.push_back({row, k, history.pressures(row, k), of.row(row).transpose()});
       }
-  state.crossed = sides_.crossed;
-  const Points places = places_.topRows(std::min<Index>(places_.rows(), points_.coarse_count()));
+  state.crossed = history.sides.crossed;
+  const Points places = history.places.topRows(count);
   for (Index k = 0; k < std::ssize(surfaces_); ++k)
-    note_inside(k, places, sides_.outside[static_cast<std::size_t>(k)], sides_.clearance.col(k), state);
+    note_inside(k, places, history.sides.outside[static_cast<std::size_t>(k)], history.sides.clearance.col(k),
+                state);
   return state;
 }
 
@@ -109,12 +124,14 @@ void ContactTerms::change_coordinates(const Mat4& motion) {
   for (std::size_t k = 0; k < starts_.size(); ++k) {
     starts_[k] = motion * starts_[k];
     surfaces_[k].set_placement(starts_[k]);
-    sides_.move_with(static_cast<Index>(k), motion);
+    if (history_) history_->sides.move_with(static_cast<Index>(k), motion);
   }
-  places_ = affine_image(places_, motion);
+  if (history_) history_->places = affine_image(history_->places, motion);
 }
 
+/// Without a history, tracking will begin at the current placements.
 void ContactTerms::move_obstacles(double share, bool ahead) {
+  if (!history_) return;
   for (Index k = 0; k < std::ssize(starts_); ++k) {
     const auto which = static_cast<std::size_t>(k);
     obstacle_motions_[which].setIdentity();
@@ -127,45 +144,42 @@ void ContactTerms::move_obstacles(double share, bool ahead) {
     else
       surfaces_[which].set_placement(ends_[which]);
     obstacle_motions_[which] = surfaces_[which].placement() * before.inverse();
-    sides_.move_with(k, obstacle_motions_[which]);
+    history_->sides.move_with(k, obstacle_motions_[which]);
   }
 }
 
 double ContactTerms::longest_obstacle_motion() const {
   double longest = 0.0;
-  for (std::size_t k = 0; k < starts_.size(); ++k)
+  for (std::size_t k = 0; k < starts_.size() && history_; ++k)
     longest = std::max(longest, (ends_[k] - surfaces_[k].placement()).topRows<3>().colwise().norm().sum());
   return longest;
 }
 
-/// Refined points inherit the last outside positions of their samples, or start at their own places where an
-/// obstacle crosses the surface.
-void ContactTerms::extend_sides() {
-  std::vector<Index> samples;
-  for (Index i = sides_.clearance.rows(); i < points_.size(); ++i) samples.push_back(points_.sample_of(i));
-  sides_.add(samples);
+/// Adds rows for points that were refined since the last search. They inherit the last outside positions of
+/// their samples, or start at their own places where an obstacle crosses the surface. Returns these rows.
+std::vector<Index> ContactTerms::extend_history(const RowMatrix<double>& coefficients) {
+  ContactHistory next = *history_;
+  std::vector<Index> rows, samples;
+  for (Index row = next.places.rows(); row < points_.size(); ++row) {
+    rows.push_back(row);
+    samples.push_back(points_.sample_of(row));
+  }
+  next.refined = points_.refined();
+  next.places = points_.at(coefficients);
+  next.sides.add(samples);
+  next.pressures.conservativeResize(points_.size(), Eigen::NoChange);
+  next.pressures.bottomRows(std::ssize(rows)).setZero();
   for (Index k = 0; k < std::ssize(surfaces_); ++k)
-    sides_.begin_beside_crossings(k, surfaces_[static_cast<std::size_t>(k)], samples, places_);
+    next.sides.begin_beside_crossings(k, surfaces_[static_cast<std::size_t>(k)], samples, next.places);
+  history_ = std::move(next);
+  return rows;
 }
 
-ContactSides ContactTerms::sides() const {
-  ContactSides sides = sides_;
-  if (self_) sides.itself = self_->last_search();
-  return sides;
-}
-
-void ContactTerms::set_sides(ContactSides sides) {
-  if (self_) self_->set_last_search(std::move(sides.itself));
-  sides_ = std::move(sides);
-  known_ = false;
-  extend_sides();
-}
-
-void ContactTerms::restore(ContactSnapshot snapshot) {
-  set_sides(std::move(snapshot.sides));
-  pressures_.setZero();
-  pressures_.topRows(snapshot.pressures.rows()) = snapshot.pressures;
+double ContactTerms::restore(ContactSnapshot snapshot, const RowMatrix<double>& coefficients) {
+  history_ = std::move(snapshot.history);
   found_.stiffness = snapshot.stiffness;
+  known_ = false;
+  return find(coefficients);
 }
 
 }  // namespace arapfields

@@ -40,8 +40,12 @@ struct ContactSides {
   std::vector<Points> anchors;             ///< anchors of friction
   RowMatrix<double> clearance;             ///< (points, surfaces) signed distance at `outside`
   std::vector<std::vector<bool>> crossed;  ///< samples at or beside an intersection; empty: none
-  SelfContact::Search itself;
 
+  ContactSides() = default;
+  /// For so many points and surfaces, of which start() is needed.
+  ContactSides(Index points, std::size_t surfaces);
+  /// Starts the tracking of a surface's sides at these places.
+  void start(Index surface, const BarrierSurface& obstacle, PointsIn places);
   /// Finds where the obstacle crosses the deforming surface; points inside it there are left_inside.
   void find_crossings(Index surface, const BarrierSurface& obstacle, const ContactPoints& points,
                       PointsIn places);
@@ -60,10 +64,19 @@ struct ContactSides {
                               const std::vector<Index>& samples, PointsIn places);
 };
 
+/// What contact remembers of each of its points, and which points these are: a solve is rolled back to it as
+/// a whole.
+struct ContactHistory {
+  std::vector<Index> refined;  ///< ContactPoints::refined()
+  Points places;               ///< (points,3) positions at the last search
+  ContactSides sides;
+  RowMatrix<double> pressures;  ///< (points, surfaces and the shape itself) multipliers
+  SelfContact::Search itself;   ///< empty without self-contact
+};
+
 /// The contact state that a solve can be rolled back to.
 struct ContactSnapshot {
-  ContactSides sides;
-  RowMatrix<double> pressures;
+  ContactHistory history;
   double stiffness = 0.0;
 };
 

@@ -51,8 +51,7 @@ struct Before {
     ++s.shape.revision;
     s.history = std::move(history);
     s.report = std::move(report);
-    s.contact.restore(std::move(snapshot));
-    s.contact.find(s.shape.coefficients);
+    s.contact.restore(std::move(snapshot), s.shape.coefficients);
   }
 };
 
@@ -240,9 +239,9 @@ void ContactSolve::approach_again_slowly(const RowMatrix<double>& start) {
   go_back(start);
   steps_.approach(motions_, longest_motion(), ContactApproach::small);
   if (!(bad < badness())) return;
-  go_back(there);
-  s.contact.restore(std::move(snapshot));
-  s.contact.find(s.shape.coefficients);
+  s.shape.coefficients = there;
+  s.shape.jump();
+  s.contact.restore(std::move(snapshot), s.shape.coefficients);
 }
 
 }  // namespace arapfields

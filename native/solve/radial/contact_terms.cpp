@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "core/errors.h"
@@ -64,21 +63,21 @@ void hold_behind(const std::vector<BarrierSurface::Hit>& hits, const std::vector
 }
 
 /// Samples near an edge of an obstacle, which may poke through between them and their neighbours.
-std::vector<Index> at_edges(const ContactSet& found, ContactPoints& points,
+std::vector<Index> at_edges(const std::vector<ContactPlane>& planes, ContactPoints& points,
                             const std::vector<BarrierSurface>& surfaces) {
   std::vector<const ContactPlane*> of(static_cast<std::size_t>(points.sample_count()));
   std::vector<Index> edges;
   const double reach = 2.0 * points.spacing();
   std::size_t first = 0;
-  while (first < found.planes.size()) {  // the planes of one surface are consecutive
+  while (first < planes.size()) {  // the planes of one surface are consecutive
     std::fill(of.begin(), of.end(), nullptr);
-    const Index k = found.planes[first].obstacle;
+    const Index k = planes[first].obstacle;
     std::size_t last = first;
-    for (; last < found.planes.size() && found.planes[last].obstacle == k; ++last)
-      if (found.planes[last].first < points.sample_count())
-        of[static_cast<std::size_t>(found.planes[last].first)] = &found.planes[last];
+    for (; last < planes.size() && planes[last].obstacle == k; ++last)
+      if (planes[last].first < points.sample_count())
+        of[static_cast<std::size_t>(planes[last].first)] = &planes[last];
     for (; first < last && !surfaces[static_cast<std::size_t>(k)].is_ground(); ++first) {
-      const ContactPlane& plane = found.planes[first];
+      const ContactPlane& plane = planes[first];
       if (plane.first >= points.sample_count() || plane.initial_gap > reach) continue;
       for (const Index other : points.neighbours(plane.first)) {
         const ContactPlane* const beside = of[static_cast<std::size_t>(other)];
@@ -92,6 +91,12 @@ std::vector<Index> at_edges(const ContactSet& found, ContactPoints& points,
   return edges;
 }
 
+std::vector<Mat4> placements_of(const std::vector<BarrierSurface>& surfaces) {
+  std::vector<Mat4> placements;
+  for (const BarrierSurface& surface : surfaces) placements.push_back(surface.placement());
+  return placements;
+}
+
 }  // namespace
 
 void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients) {
@@ -99,54 +104,76 @@ void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<do
     require_contact(*contact);
     require(!problem_.blend, "contact", "beside exact handles", "it needs handles that give way");
   }
-  const bool goes_on = contact && contact_ && contact->itself == contact_->itself &&
+  const bool goes_on = history_ && contact && contact_ && contact->itself == contact_->itself &&
                        contact->obstacles.size() == contact_->obstacles.size() &&
                        contact->ground.has_value() == contact_->ground.has_value();
-  contact_ = contact;
   known_ = false;
   ended_.reset();
-  if (goes_on) {
-    const std::vector<BarrierSurface> before = std::exchange(surfaces_, {});
-    gather_surfaces();
-    places_ = points_.at(coefficients);
-    for (Index k = 0; k < std::ssize(surfaces_); ++k) {
-      BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
-      if (surface.has_same_function(before[static_cast<std::size_t>(k)]))
-        surface.set_placement(before[static_cast<std::size_t>(k)].placement());  // tracking continues
-      else {
-        start_tracking(k);
-        sides_.find_crossings(k, surface, points_, places_);
-      }
-      starts_.push_back(surface.placement());
-    }
-    return;
+  std::vector<BarrierSurface> next = surfaces_of(contact, second_ground_);
+  if (!goes_on) {
+    std::optional<SelfContact> self;
+    if (contact && contact->itself) self.emplace(problem_, points_.samples(), safety_distance_itself);
+    forget();
+    contact_ = contact;
+    self_ = std::move(self);
+    set_surfaces(std::move(next));
+    return begin(coefficients);
   }
-  gather_surfaces();
-  self_.reset();
-  if (contact_ && contact_->itself) self_.emplace(problem_, points_.samples(), safety_distance_itself);
+  std::vector<Mat4> ends = placements_of(next);
+  ContactHistory history = *history_;
+  points_.set_refined(history.refined);
+  history.places = points_.at(coefficients);
+  for (Index k = 0; k < std::ssize(next); ++k) {
+    BarrierSurface& surface = next[static_cast<std::size_t>(k)];
+    const BarrierSurface& before = surfaces_[static_cast<std::size_t>(k)];
+    if (surface.has_same_function(before))
+      surface.set_placement(before.placement());  // tracking continues
+    else {
+      history.sides.start(k, surface, history.places);
+      history.sides.find_crossings(k, surface, points_, history.places);
+    }
+  }
+  contact_ = contact;
+  history_ = std::move(history);
+  set_surfaces(std::move(next));
+  ends_ = std::move(ends);
+}
+
+void ContactTerms::set_second_ground(const std::optional<Ground>& ground,
+                                     const RowMatrix<double>& coefficients) {
+  if (ground == second_ground_) return;
+  std::vector<BarrierSurface> next = surfaces_of(contact_, ground);
+  forget();
+  second_ground_ = ground;
+  set_surfaces(std::move(next));
   begin(coefficients);
 }
 
-bool ContactTerms::set_second_ground(const std::optional<Ground>& ground) {
-  if (ground == second_ground_) return false;
-  second_ground_ = ground;
-  gather_surfaces();
-  return true;
+/// The surfaces of a contact; chooses the contact points, if it needs any.
+std::vector<BarrierSurface> ContactTerms::surfaces_of(const std::optional<Contact>& contact,
+                                                      const std::optional<Ground>& second_ground) {
+  std::vector<BarrierSurface> surfaces;
+  if (contact) {
+    for (const Obstacle& obstacle : contact->obstacles) surfaces.emplace_back(obstacle, problem_.frame());
+    if (contact->ground)
+      surfaces.push_back(BarrierSurface::ground({*contact->ground, contact->up}, problem_.frame()));
+  }
+  if (second_ground) surfaces.push_back(BarrierSurface::ground(*second_ground, problem_.frame()));
+  if (!surfaces.empty() || (contact && contact->itself)) points_.choose();
+  return surfaces;
 }
 
-void ContactTerms::gather_surfaces() {
-  surfaces_.clear();
-  if (contact_) {
-    for (const Obstacle& obstacle : contact_->obstacles) surfaces_.emplace_back(obstacle, problem_.frame());
-    if (contact_->ground)
-      surfaces_.push_back(BarrierSurface::ground({*contact_->ground, contact_->up}, problem_.frame()));
-  }
-  if (second_ground_) surfaces_.push_back(BarrierSurface::ground(*second_ground_, problem_.frame()));
-  ends_.clear();
-  for (const BarrierSurface& surface : surfaces_) ends_.push_back(surface.placement());
+void ContactTerms::set_surfaces(std::vector<BarrierSurface> surfaces) {
+  surfaces_ = std::move(surfaces);
+  starts_ = ends_ = placements_of(surfaces_);
   obstacle_motions_.assign(surfaces_.size(), Mat4::Identity());
-  starts_.clear();
-  if (!surfaces_.empty() || (contact_ && contact_->itself)) points_.choose();
+}
+
+/// Ends the tracking: no planes are left of it.
+void ContactTerms::forget() {
+  history_.reset();
+  release();
+  known_ = false;
 }
 
 void ContactTerms::release() {
@@ -156,19 +183,21 @@ void ContactTerms::release() {
   found_.places.resize(0, 3);
   found_.embedded.resize(0, 3);
   found_.stiffness = ContactSet::softest;
-  pressures_.setZero();
+  if (history_) history_->pressures.setZero();
   deepest_ = deepest_outside_ = 0.0;
   touches_itself_ = false;
 }
 
 /// Rows of points that may be within the distance threshold of a surface, by how far they have moved.
 std::vector<Index> ContactTerms::near_rows() const {
+  const ContactHistory& history = *history_;
+  const ContactSides& sides = history.sides;
   std::vector<Index> rows;
-  for (Index i = 0; i < places_.rows(); ++i)
-    for (Index k = 0; k < sides_.clearance.cols(); ++k) {
+  for (Index i = 0; i < history.places.rows(); ++i)
+    for (Index k = 0; k < sides.clearance.cols(); ++k) {
       const auto which = static_cast<std::size_t>(k);
-      const double moved = (places_.row(i) - sides_.outside[which].row(i)).norm();
-      if (sides_.clearance(i, k) - moved < near + extra_ + surfaces_[which].margin()) {
+      const double moved = (history.places.row(i) - sides.outside[which].row(i)).norm();
+      if (sides.clearance(i, k) - moved < near + extra_ + surfaces_[which].margin()) {
         rows.push_back(i);
         break;
       }
@@ -177,60 +206,56 @@ std::vector<Index> ContactTerms::near_rows() const {
 }
 
 /// Adds the planes of obstacles and grounds for these points, and updates their last outside positions.
-void ContactTerms::find_outside(const std::vector<Index>& rows) {
-  const Points now = rows_of(places_, rows);
-  for (Index k = 0; k < sides_.clearance.cols(); ++k) {
-    const Vector distances = add_planes(k, rows, now);
+void ContactTerms::find_outside(const std::vector<Index>& rows, std::vector<ContactPlane>& planes) {
+  ContactSides& sides = history_->sides;
+  const Points now = rows_of(history_->places, rows);
+  for (Index k = 0; k < sides.clearance.cols(); ++k) {
+    const Vector distances = add_planes(k, rows, now, planes);
     for (Index i = 0; i < now.rows(); ++i) {
       if (distances[i] <= 0.0) continue;  // inside: keeps its last outside position
       const Index row = rows[static_cast<std::size_t>(i)];
-      sides_.outside[static_cast<std::size_t>(k)].row(row) = now.row(i);
-      sides_.clearance(row, k) = distances[i];
+      sides.outside[static_cast<std::size_t>(k)].row(row) = now.row(i);
+      sides.clearance(row, k) = distances[i];
     }
   }
 }
 
 double ContactTerms::find(const RowMatrix<double>& coefficients, std::optional<double> extra, bool jumped) {
+  if (!any()) return 0.0;
+  if (!history_) begin(coefficients);
   if (known_ && !has_friction_ && !jumped && extra.value_or(0.0) <= extra_ && points_.is_at(coefficients))
     return deepest_;
-  known_ = true;
-  const Points before = std::exchange(places_, points_.at(coefficients));
-  extra_ = extra ? *extra : std::sqrt((places_ - before).rowwise().squaredNorm().maxCoeff());
-  has_friction_ = false;
-  found_.planes.clear();
+  known_ = false;  // an obstacle's function may throw
+  ContactHistory& history = *history_;
+  points_.set_refined(history.refined);
+  const Points before = std::exchange(history.places, points_.at(coefficients));
+  extra_ = extra ? *extra : std::sqrt((history.places - before).rowwise().squaredNorm().maxCoeff());
   deepest_ = 0.0;
-  find_outside(near_rows());
-  const std::vector<Index> edges = at_edges(found_, points_, surfaces_);
-  const Index known = points_.size();
-  points_.refine(edges);
-  if (points_.size() > known) {
-    const Points finer = points_.at(coefficients).bottomRows(points_.size() - known);
-    places_.conservativeResize(points_.size(), Eigen::NoChange);
-    places_.bottomRows(finer.rows()) = finer;
-    pressures_.conservativeResize(places_.rows(), Eigen::NoChange);
-    pressures_.bottomRows(finer.rows()).setZero();
-    extend_sides();
-    std::vector<Index> rows(static_cast<std::size_t>(finer.rows()));
-    std::iota(rows.begin(), rows.end(), known);
-    find_outside(rows);
-  }
+  std::vector<ContactPlane> planes;
+  find_outside(near_rows(), planes);
+  points_.refine(at_edges(planes, points_, surfaces_));
+  if (points_.refined() != history.refined) find_outside(extend_history(coefficients), planes);
   deepest_outside_ = deepest_;
   ahead_ = false;
-  if (self_) add_own_planes(coefficients, jumped);
-  gather_places();
+  if (self_) add_own_planes(coefficients, jumped, planes);
+  set_planes(std::move(planes));
+  known_ = true;
   return deepest_;
 }
 
 /// Adds the planes of surface k for points (rows) at positions `now`. Returns their signed distances, which
 /// are negative also for points that have tunnelled through it.
-Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsIn now) {
+Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsIn now,
+                                std::vector<ContactPlane>& planes) {
   const BarrierSurface& surface = surfaces_[static_cast<std::size_t>(k)];
-  const Points& outside = sides_.outside[static_cast<std::size_t>(k)];
+  ContactSides& sides = history_->sides;
+  RowMatrix<double>& pressures = history_->pressures;
+  const Points& outside = sides.outside[static_cast<std::size_t>(k)];
   BarrierSurface::Nearest nearest = surface.nearest(now);
   std::vector<Index> moved_rows, starts;  // points that may have crossed: rows of `now`, and of all points
   for (Index i = 0; i < now.rows(); ++i) {
     const Index row = rows[static_cast<std::size_t>(i)];
-    const double moved = (now.row(i) - outside.row(row)).norm(), clearance = sides_.clearance(row, k);
+    const double moved = (now.row(i) - outside.row(row)).norm(), clearance = sides.clearance(row, k);
     if (clearance > 0.0 && moved > clearance + std::max(0.0, nearest.distances[i]) - unsure)
       moved_rows.push_back(i), starts.push_back(row);
   }
@@ -243,26 +268,26 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
   const Points carried = affine_image(now, obstacle_motions_[static_cast<std::size_t>(k)]);
   for (Index i = 0; i < now.rows(); ++i) {
     const Index row = rows[static_cast<std::size_t>(i)];
-    const bool crossed = sides_.crosses(k, points_.sample_of(row));
+    const bool crossed = sides.crosses(k, points_.sample_of(row));
     double margin = surface.margin() + safety_distance;
-    if (crossed) margin = std::clamp(sides_.clearance(row, k), 0.0, margin);  // not more than it had at first
+    if (crossed) margin = std::clamp(sides.clearance(row, k), 0.0, margin);  // not more than it had at first
     const double gap = nearest.distances[i] - margin;
-    const bool left = sides_.clearance(row, k) == ContactSides::left_inside && nearest.distances[i] < 0.0;
+    const bool left = sides.clearance(row, k) == ContactSides::left_inside && nearest.distances[i] < 0.0;
     if (left || gap > near + extra_) {
-      pressures_(row, k) = 0.0;
+      pressures(row, k) = 0.0;
       continue;
     }
     deepest_ = std::max(deepest_, -gap - safety_distance);
-    ContactPlane& plane = found_.planes.emplace_back();
+    ContactPlane& plane = planes.emplace_back();
     plane.first = row;
     plane.normal = nearest.normals.row(i).transpose();
     plane.offset = offsets[i] + margin;
     plane.initial_gap = gap;
-    plane.pressure = pressures_(row, k);
+    plane.pressure = pressures(row, k);
     plane.area = points_.area(row);
     plane.obstacle = k;
     plane.anchor = carried.row(i).transpose();
-    auto anchor = sides_.anchors[static_cast<std::size_t>(k)].row(row);
+    auto anchor = sides.anchors[static_cast<std::size_t>(k)].row(row);
     if (plane.pressure > 0.0) {  // the anchor follows a sliding point at the distance `stuck`
       const Vec3 slip = plane.along(plane.anchor - anchor.transpose());
       plane.anchor -= std::min(1.0, stuck / slip.norm()) * slip;
@@ -274,19 +299,21 @@ Vector ContactTerms::add_planes(Index k, const std::vector<Index>& rows, PointsI
 }
 
 /// Adds the planes of self-contact.
-void ContactTerms::add_own_planes(const RowMatrix<double>& coefficients, bool jumped) {
-  const Index own = pressures_.cols() - 1;
-  const Vector before = pressures_.col(own);
+void ContactTerms::add_own_planes(const RowMatrix<double>& coefficients, bool jumped,
+                                  std::vector<ContactPlane>& planes) {
+  ContactHistory& history = *history_;
+  const Index own = history.pressures.cols() - 1;
+  const Vector before = history.pressures.col(own);
   touches_itself_ = false;
-  pressures_.col(own).setZero();
+  history.pressures.col(own).setZero();
   const auto normals = [&](auto* blocks) { return points_.normals_at(coefficients, blocks); };
-  const Points samples = places_.topRows(points_.sample_count());
   for (const FacingPair& pair :
-       self_->find(samples, normals, std::min(near_itself + extra_, farthest), jumped)) {
-    pressures_(pair.first, own) = before[pair.first];
+       self_->find(samples_of(history.places), normals, std::min(near_itself + extra_, farthest), jumped,
+                   history.itself)) {
+    history.pressures(pair.first, own) = before[pair.first];
     deepest_ = std::max(deepest_, pair.least - safety_distance - pair.gap);
     touches_itself_ = touches_itself_ || pair.gap < pair.least - slight;
-    ContactPlane& plane = found_.planes.emplace_back();
+    ContactPlane& plane = planes.emplace_back();
     plane.first = pair.first;
     plane.second = pair.second;
     plane.normal = pair.normal;
@@ -298,8 +325,7 @@ void ContactTerms::add_own_planes(const RowMatrix<double>& coefficients, bool ju
 }
 
 bool ContactTerms::overlaps(const RowMatrix<double>& coefficients) {
-  return self_ && self_->overlaps(points_.at(coefficients).topRows(points_.sample_count()),
-                                  points_.normals_at(coefficients));
+  return self_ && self_->overlaps(samples_of(points_.at(coefficients)), points_.normals_at(coefficients));
 }
 
 }  // namespace arapfields

@@ -22,8 +22,8 @@ class ContactTerms {
   void prepare(const Progress& progress) { points_.choose(progress); }  ///< the expensive part of set()
   /// Obstacles that have moved keep their placements until move_obstacles(). Throws InvalidInput.
   void set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients);
-  /// Sets a second ground, beside the contact's own; returns whether it has changed.
-  bool set_second_ground(const std::optional<Ground>& ground);
+  /// Sets a second ground, beside the contact's own; if it is another one, tracking begins anew.
+  void set_second_ground(const std::optional<Ground>& ground, const RowMatrix<double>& coefficients);
   const std::optional<Contact>& contact() const { return contact_; }
   bool any() const { return !surfaces_.empty() || self_; }
   bool itself() const { return self_.has_value(); }
@@ -33,6 +33,8 @@ class ContactTerms {
   void begin(const RowMatrix<double>& coefficients) { resume({}, coefficients); }
   /// The state that the next time step depends on; resume() restores it.
   ContactState state() const;
+  /// Throws InvalidInput, naming `state`, for the state of other contact points or surfaces.
+  void require_own(const ContactState& state) const;
   void resume(const ContactState& state, const RowMatrix<double>& coefficients);
   /// Applies a rigid change of the cube's coordinates.
   void change_coordinates(const Mat4& motion);
@@ -46,12 +48,10 @@ class ContactTerms {
   /// motion of a point since the last search. `jumped`: the path is unknown; facing normals tell
   /// self-penetration.
   double find(const RowMatrix<double>& coefficients, std::optional<double> extra = 0.0, bool jumped = false);
-  ContactSides sides() const;
-  /// Undoes all searches since sides() returned this.
-  void set_sides(ContactSides sides);
-  /// The state to return to after a rejected trial.
-  ContactSnapshot snapshot() const { return {sides(), pressures_, found_.stiffness}; }
-  void restore(ContactSnapshot snapshot);
+  /// The state to return to after a rejected trial; there is one after find().
+  ContactSnapshot snapshot() const { return {history_.value(), found_.stiffness}; }
+  /// Returns to a snapshot, and finds the planes at this shape, as find() does.
+  double restore(ContactSnapshot snapshot, const RowMatrix<double>& coefficients);
   /// The largest speed of a contact point for these rates of the coefficients.
   double fastest(const RowMatrix<double>& rates) {
     return std::sqrt(points_.at(rates).rowwise().squaredNorm().maxCoeff());
@@ -60,7 +60,7 @@ class ContactTerms {
   /// the pressures' relative change, 0 to 1.
   double update_pressures(const double* places, const Vector& factors);
   /// Number of obstacles and grounds, and one for the shape itself.
-  Index surface_count() const { return pressures_.cols(); }
+  Index surface_count() const { return std::ssize(surfaces_) + 1; }
   /// Gives the planes Coulomb friction of their current pressures.
   void add_friction();
   void adapt_stiffness(bool raise) { found_.adapt_stiffness(raise); }
@@ -79,19 +79,24 @@ class ContactTerms {
   double deepest_outside() const { return deepest_outside_; }  ///< without self-contact
   /// Whether parts of the surface touched each other at the last search.
   bool touches_itself() const { return touches_itself_; }
-  std::vector<Index> crossing_surfaces() const { return sides_.crossing_surfaces(); }
+  std::vector<Index> crossing_surfaces() const {
+    return history_ ? history_->sides.crossing_surfaces() : std::vector<Index>();
+  }
   /// Whether a part is inside another one at this shape, however deep, or is pressed flat.
   bool overlaps(const RowMatrix<double>& coefficients);
 
  private:
-  void gather_surfaces();
-  void start_tracking(Index k);
+  std::vector<BarrierSurface> surfaces_of(const std::optional<Contact>& contact,
+                                          const std::optional<Ground>& second_ground);
+  void set_surfaces(std::vector<BarrierSurface> surfaces);
+  void forget();
+  auto samples_of(const Points& places) const { return places.topRows(points_.sample_count()); }
   std::vector<Index> near_rows() const;
-  void find_outside(const std::vector<Index>& rows);
-  Vector add_planes(Index k, const std::vector<Index>& rows, PointsIn now);
-  void extend_sides();
-  void add_own_planes(const RowMatrix<double>& coefficients, bool jumped);
-  void gather_places();
+  void find_outside(const std::vector<Index>& rows, std::vector<ContactPlane>& planes);
+  Vector add_planes(Index k, const std::vector<Index>& rows, PointsIn now, std::vector<ContactPlane>& planes);
+  std::vector<Index> extend_history(const RowMatrix<double>& coefficients);
+  void add_own_planes(const RowMatrix<double>& coefficients, bool jumped, std::vector<ContactPlane>& planes);
+  void set_planes(std::vector<ContactPlane> planes);
 
   const RadialProblem& problem_;
   std::optional<Contact> contact_;
@@ -101,10 +106,8 @@ class ContactTerms {
   std::vector<Mat4> ends_;              // and to
   std::vector<Mat4> obstacle_motions_;  // the motions of its last call
   ContactPoints points_;
-  Points places_;  // positions at the last search
   std::optional<SelfContact> self_;
-  ContactSides sides_;
-  RowMatrix<double> pressures_;  // (points, surface_count()) multipliers
+  std::optional<ContactHistory> history_;  // none: the next search begins anew
   ContactSet found_;
   Revision sets_ = 0;  // number of contact sets so far
   std::optional<Revision> ended_;

@@ -222,7 +222,7 @@ void RadialSolver::set_secondary_motion(const std::optional<SecondaryMotion>& mo
   s.dynamics.set(motion);
   std::optional<Ground> ground;
   if (s.dynamics.has_mass() && motion->ground) ground = Ground{*motion->ground, motion->up};
-  if (s.contact.set_second_ground(ground)) s.contact.begin(s.shape.coefficients);
+  s.contact.set_second_ground(ground, s.shape.coefficients);
 }
 
 MotionState RadialSolver::motion_state() const {
@@ -245,6 +245,7 @@ void RadialSolver::set_motion_state(const MotionState& state) {
   require(state.motions.empty() || std::ssize(state.motions) == count, "state",
           "of " + std::to_string(state.motions.size()) + " handles",
           "the solver has " + std::to_string(count));
+  s.contact.require_own(state.contact);
   s.shape.coefficients = state.coefficients;
   s.dynamics.velocities = state.velocities;
   s.dynamics.accelerations = state.accelerations;

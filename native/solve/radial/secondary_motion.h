@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct SecondaryMotion {
 
 /// The contact state between two time steps: obstacles' placements, multipliers, and points' sides.
 struct ContactState {
+  std::uint64_t points = 0;      ///< a hash of the contact points; 0: no contact
   std::vector<Mat4> placements;  ///< from the functions' cubes to the surface's
   struct Pressure {
     Index row;

@@ -91,7 +91,6 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
     for (const Index i : {pair.first, pair.second})
       at_rest[i] = std::min(at_rest[i], std::max(0.0, pair.gap));
   least_gaps_ = (windings_above_.array() > inside).select(0.0, at_rest);
-  begin(places, [&](auto*) { return normals; });
 }
 
 /// Scales the winding numbers to a jump of 1 across the surface, and computes those at rest.
@@ -154,10 +153,10 @@ bool SelfContact::is_cut(Index i, Index j) const {
 
 /// Whether sample i, behind sample j's tangent plane, has passed through it: at the last search i was paired
 /// with the same part, or in front of j.
-bool SelfContact::came_through(Index i, Index j, const Vec3& normal) const {
-  const Index before = last_search_.faced[static_cast<std::size_t>(i)];
+bool SelfContact::came_through(Index i, Index j, const Vec3& normal, const Search& last) const {
+  const Index before = last.faced[static_cast<std::size_t>(i)];
   return (before >= 0 && !is_far(before, j, far_inside)) ||
-         (last_search_.places.row(i) - last_search_.places.row(j)).dot(normal.transpose()) >= 0.0;
+         (last.places.row(i) - last.places.row(j)).dot(normal.transpose()) >= 0.0;
 }
 
 /// Whether a pair of samples is not excluded.
@@ -166,12 +165,13 @@ bool SelfContact::may_meet(Index i, Index j) const {
 }
 
 /// Whether a gap along the normal of sample j makes a pair.
-bool SelfContact::is_gap(double gap, Index i, Index j, const Vec3& normal, Penetrations penetrations) const {
+bool SelfContact::is_gap(double gap, Index i, Index j, const Vec3& normal, Penetrations penetrations,
+                         const Search& last) const {
   switch (penetrations) {
     case Penetrations::none:
       return gap >= 0.0;
     case Penetrations::as_came:
-      return gap >= 0.0 || came_through(i, j, normal);
+      return gap >= 0.0 || came_through(i, j, normal, last);
     case Penetrations::shallow:
       return gap >= -shallow;
     default:
@@ -181,7 +181,7 @@ bool SelfContact::is_gap(double gap, Index i, Index j, const Vec3& normal, Penet
 
 /// The nearest sample within `near` that sample i faces, out of these runs; −1: none.
 Index SelfContact::faced_by(Index i, const std::vector<Index>& runs, PointsIn places, const Points& normals,
-                            double near, Penetrations penetrations) const {
+                            double near, Penetrations penetrations, const Search& last) const {
   if (least_gaps_[i] <= 0.0) return -1;
   const Vec3 place = places.row(i).transpose(), normal = normals.row(i).transpose();
   Index faced = -1;
@@ -195,7 +195,7 @@ Index SelfContact::faced_by(Index i, const std::vector<Index>& runs, PointsIn pl
       const double gap = arm.dot(other);
       if (normal.dot(other) > facing || square - gap * gap > most_offset_ * most_offset_) continue;
       if (-gap > std::min(widths_[i], widths_[j]) || !may_meet(i, j)) continue;
-      if (!is_gap(gap, i, j, other, penetrations)) continue;
+      if (!is_gap(gap, i, j, other, penetrations, last)) continue;
       nearest = square;
       faced = j;
     }
@@ -203,7 +203,7 @@ Index SelfContact::faced_by(Index i, const std::vector<Index>& runs, PointsIn pl
 }
 
 std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& normals_at, double near,
-                                            Penetrations penetrations) {
+                                            Penetrations penetrations, const Search& last) {
   Points areas;  // all normals at once if the last search needed them for winding numbers
   if (std::exchange(penetrates_, false)) areas = normals_at(nullptr);
   Points normals = unit_rows(areas);
@@ -224,13 +224,13 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
   }
   std::vector<Index> faced(static_cast<std::size_t>(places.rows()), -1);
   const auto look = [&](Penetrations which, const auto& wanted) {
-    parallel_for(0, std::ssize(runs), 32, [&](Index first, Index last) {
-      for (Index k = first; k < last; ++k) {
+    parallel_for(0, std::ssize(runs), 32, [&](Index begun, Index ended) {
+      for (Index k = begun; k < ended; ++k) {
         const Index run = runs[static_cast<std::size_t>(k)];
         for (const Index i : runs_->samples(run))
           if (wanted(i))
             faced[static_cast<std::size_t>(i)] =
-                faced_by(i, near_to[static_cast<std::size_t>(run)], places, normals, near, which);
+                faced_by(i, near_to[static_cast<std::size_t>(run)], places, normals, near, which, last);
       }
     });
   };
@@ -281,20 +281,21 @@ bool SelfContact::overlaps(PointsIn places, PointsIn normals) const {
   return change.lpNorm<Eigen::Infinity>() > inside_another;
 }
 
-void SelfContact::remember(PointsIn places, const std::vector<FacingPair>& pairs) {
-  last_search_.places = places;
-  last_search_.faced.assign(static_cast<std::size_t>(places.rows()), -1);
-  for (const FacingPair& pair : pairs) last_search_.faced[static_cast<std::size_t>(pair.first)] = pair.second;
+SelfContact::Search SelfContact::search_of(PointsIn places, const std::vector<FacingPair>& pairs) {
+  Search result{places, std::vector<Index>(static_cast<std::size_t>(places.rows()), -1)};
+  for (const FacingPair& pair : pairs) result.faced[static_cast<std::size_t>(pair.first)] = pair.second;
+  return result;
 }
 
-void SelfContact::begin(PointsIn places, const Normals& normals) {
-  remember(places, search(places, normals, near_at_rest, Penetrations::shallow));
+SelfContact::Search SelfContact::begin(PointsIn places, const Normals& normals) {
+  return search_of(places, search(places, normals, near_at_rest, Penetrations::shallow));
 }
 
-std::vector<FacingPair> SelfContact::find(PointsIn places, const Normals& normals, double near, bool jumped) {
+std::vector<FacingPair> SelfContact::find(PointsIn places, const Normals& normals, double near, bool jumped,
+                                          Search& last) {
   std::vector<FacingPair> pairs =
-      search(places, normals, near, jumped ? Penetrations::all : Penetrations::as_came);
-  remember(places, pairs);
+      search(places, normals, near, jumped ? Penetrations::all : Penetrations::as_came, last);
+  last = search_of(places, pairs);
   return pairs;
 }
 

@@ -37,36 +37,36 @@ class SelfContact {
   /// normals.
   SelfContact(const RadialProblem& problem, const std::vector<Index>& rows, double safety_distance);
 
-  /// Pairs each sample with the nearest one that it faces within `near`, in cube units, at places (n,3).
-  /// `normals` is called only if parts are near each other. `jumped`: the last search says nothing of how the
-  /// shape came here, so that all negative gaps count.
-  std::vector<FacingPair> find(PointsIn places, const Normals& normals, double near, bool jumped = false);
+  /// Pairs each sample with the nearest one that it faces within `near`, in cube units, at places (n,3), and
+  /// replaces the last search. `normals` is called only if parts are near each other. `jumped`: the last
+  /// search says nothing of how the shape came here, so that all negative gaps count.
+  std::vector<FacingPair> find(PointsIn places, const Normals& normals, double near, bool jumped,
+                               Search& last);
   /// Whether a part is inside another one, however deep, that it is outside of at rest, or is pressed flat
   /// (by winding numbers).
   bool overlaps(PointsIn places, PointsIn normals) const;
-  const Search& last_search() const { return last_search_; }
-  void set_last_search(Search search) { last_search_ = std::move(search); }
-  /// Starts at a solved shape: as the last search, but only shallow negative gaps count.
-  void begin(PointsIn places, const Normals& normals);
+  /// The search that a solved shape starts with, in which only shallow negative gaps count.
+  Search begin(PointsIn places, const Normals& normals);
 
  private:
   /// Which negative gaps (penetrations) count as pairs; at_rest is `all` without the test of winding numbers.
   enum class Penetrations { none, as_came, shallow, all, at_rest };
   std::vector<FacingPair> search(PointsIn places, const Normals& normals, double near,
-                                 Penetrations penetrations);
+                                 Penetrations penetrations, const Search& last = {});
   bool is_far(Index i, Index j, double distance) const;
   bool is_cut(Index i, Index j) const;
   bool may_meet(Index i, Index j) const;
-  bool came_through(Index i, Index j, const Vec3& normal) const;
-  bool is_gap(double gap, Index i, Index j, const Vec3& normal, Penetrations penetrations) const;
+  bool came_through(Index i, Index j, const Vec3& normal, const Search& last) const;
+  bool is_gap(double gap, Index i, Index j, const Vec3& normal, Penetrations penetrations,
+              const Search& last) const;
   Index faced_by(Index i, const std::vector<Index>& runs, PointsIn places, const Points& normals, double near,
-                 Penetrations penetrations) const;
+                 Penetrations penetrations, const Search& last) const;
   double winding(const SampleWindings& windings, Index i, double side, PointsIn places,
                  PointsIn normals) const;
   Vector windings_below(const SampleWindings& windings, PointsIn places, PointsIn normals) const;
   void measure_rest(PointsIn places);
   void find_cuts(PointsIn places);
-  void remember(PointsIn places, const std::vector<FacingPair>& pairs);
+  static Search search_of(PointsIn places, const std::vector<FacingPair>& pairs);
 
   RowMatrix<double> inside_;  // (n,6) rest positions and their interior embedding
   Points normals_;            // (n,3) at rest
@@ -82,8 +82,7 @@ class SelfContact {
   Vector widths_;               // (n) local width of the shape: twice its thickness
   Vector least_gaps_;           // (n) gaps at rest, at most safety_distance_; 0: excluded
   double most_offset_ = 0.0;    // largest tangential offset of a pair, in cube units
-  Search last_search_;
-  bool penetrates_ = false;  // whether a gap was negative at the last search
+  bool penetrates_ = false;     // whether a gap was negative at the last search
 };
 
 }  // namespace arapfields
