@@ -15,7 +15,9 @@ PYTEST := $(PY) -m pytest
 # There, a thread of libtorch's or numpy's that waits must not hold the processor that another process needs.
 # Compiled Python is kept, also where it is told to keep none: each Blender would compile the extension again.
 BYTECODE := PYTHONDONTWRITEBYTECODE= PYTHONPYCACHEPREFIX=$(abspath build/bytecode)
-ALL_TESTS := OMP_WAIT_POLICY=passive OPENBLAS_NUM_THREADS=1 $(BYTECODE) $(PYTEST) -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+ENVIRONMENT := OMP_WAIT_POLICY=passive OPENBLAS_NUM_THREADS=1 $(BYTECODE)
+AT_ONCE := -n logical --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+ALL_TESTS := $(ENVIRONMENT) $(PYTEST) $(AT_ONCE)
 # BACKEND=eigen: the library without libtorch, as wheels and zips have it, in a folder of its own beside .venv's.
 BACKEND := torch
 TORCH := $(VENV)/.torch
@@ -35,7 +37,7 @@ endif
 NATIVE_TESTS := $(BUILD)/tests/native_tests
 export ARAPFIELDS_NATIVE_TESTS := $(NATIVE_TESTS)
 
-.PHONY: help setup build examples demo test test-slow test-windows test-arm64 fuzz fuzz-contact bench sanitize format lint wheels workflows extension release blenders gallery docs clean
+.PHONY: help setup build examples demo test test-slow test-rounding test-windows test-arm64 fuzz fuzz-contact bench sanitize format lint wheels workflows extension release blenders gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -112,6 +114,17 @@ test: build $(NATIVE_TESTS)  ## all tests but the slow ones; TESTS="tests/python
 
 test-slow: build $(NATIVE_TESTS)  ## every test
 	$(ALL_TESTS) tests
+
+# TESTS="tests/python/… …" names some, LEVELS="baseline avx2 …" and NUDGES="0 1 …" conditions; PART=N takes a few
+# minutes' part of all. BACKEND takes one of the two.
+test-rounding:  ## the tests as other processors round, and with shapes moved by 1e-7 of their size, on both backends
+	@failed=0; for backend in $(if $(filter command line,$(origin BACKEND)),$(BACKEND),torch eigen); do \
+	  $(MAKE) --no-print-directory test-rounding-here BACKEND=$$backend || failed=1; done; exit $$failed
+
+.PHONY: test-rounding-here
+test-rounding-here: build $(NATIVE_TESTS)
+	@$(ENVIRONMENT) $(PY) -m tests.rounding --pytest="$(AT_ONCE)" $(if $(LEVELS),--levels "$(LEVELS)") \
+	  $(if $(NUDGES),--nudges "$(NUDGES)") $(if $(PART),--part $(PART)) $(filter-out tests,$(TESTS))
 
 # Debian: g++-mingw-w64-x86-64-posix and wine64. WINDOWS takes arguments: WINDOWS="--python 3.13", files of tests.
 WINE := $(shell command -v wine64 || ls /usr/lib/wine/wine64 2> /dev/null)

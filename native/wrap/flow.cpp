@@ -266,12 +266,4 @@ double WrapFlow::stretch() const {
   return sum / static_cast<double>(count);
 }
 
-double WrapFlow::distance() const {
-  Vector growth;
-  const Points normals = moved_normals(jacobians_, rest_normals_, growth);
-  return surface_distances(target_.tree, target_.points, target_.normals, target_.spacing, points_, normals,
-                           growth, target_.interior)
-      .mean;
-}
-
 }  // namespace arapfields

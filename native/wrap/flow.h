@@ -64,8 +64,6 @@ class WrapFlow {
   const Points& landmarks() const { return landmarks_; }
   /// Mean ‖J − R‖² of some samples.
   double stretch() const;
-  /// Mean distance of the samples to the target, in the source's cube.
-  double distance() const;
 
  private:
   struct StepSamples;

@@ -18,7 +18,7 @@ struct LandmarkVerdict {
 /// Finds outliers among the landmark pairs. Candidate similarities come from triples of pairs (Fischler,
 /// Bolles 1981, "Random Sample Consensus"). A coarse wrap from each, with a low landmark weight, shows the
 /// pairs that stay far from their targets; one of them is kept after all if a high weight brings it there
-/// with little more stretch, or brings the surface nearer to the target. With too many outliers all pairs are
+/// with little more stretch, or relaxes the surface. With too many outliers all pairs are
 /// kept, with a warning. Throws InvalidInput if the pairs are those of a mirror image.
 LandmarkVerdict trusted_landmarks(const SurfaceSamples& samples, const WrapSource& source,
                                   const WrapTarget& target, const WrapOptions& options,

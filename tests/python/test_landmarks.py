@@ -83,7 +83,7 @@ def test_landmarks_that_lie_are_named_and_left_out(figure, samples, wrong):
     assert np.array_equal(field(v), af.wrap(samples, sdf, right, options)(v))
 
 
-@pytest.mark.parametrize("seed", [2, 11, 24])
+@pytest.mark.parametrize("seed", [2, 6, 11, 24])
 def test_a_landmark_that_lies_a_little_is_named_beside_one_that_lies_much(seed):
     """An eighth of the size off, on the same arm; the other one anywhere."""
     v, f, ends = cases.star()
@@ -111,7 +111,7 @@ def test_a_landmark_on_a_round_back_is_not_blamed_for_what_another_says(figure, 
     assert set(report.left_out) <= {liar}
 
 
-@pytest.mark.parametrize(("curl", "target_curl"), [(2.2, -1.5), (3.0, -1.0)])
+@pytest.mark.parametrize(("curl", "target_curl"), [(2.2, -1.5), (3.0, -1.0), (2.1, -2.0)])
 def test_a_landmark_that_unbends_a_tail_is_followed(curl, target_curl):
     """It costs much stretch, and takes the whole tail onto the target's."""
     v, f, ends = cases.tailed(curl)

@@ -6,6 +6,7 @@ import tempfile
 import bmesh
 import bpy
 import numpy as np
+from support.geometry.nudge import nudged
 
 QUICK = {"iterations": 40, "samples": 1000, "batch": 100, "width": 32, "layers": 2}
 
@@ -30,6 +31,7 @@ def bar(name="Bar", length=1.0):
     bmesh.ops.scale(cube, vec=(2 * length, 0.5, 0.5), verts=cube.verts)
     cube.to_mesh(mesh)
     cube.free()
+    nudge(mesh)
     item = bpy.data.objects.new(name, mesh)
     bpy.context.collection.objects.link(item)
     bpy.context.view_layer.update()
@@ -164,6 +166,11 @@ def everything(item):
     contents["group names"] = [g.name for g in item.vertex_groups]
     contents["groups"] = [[(g.group, g.weight) for g in v.groups] for v in mesh.vertices]
     return contents
+
+
+def nudge(mesh):
+    """Moves the mesh as support.geometry.nudge moves all shapes."""
+    set_positions(mesh, nudged([vertex.co for vertex in mesh.vertices]))
 
 
 def set_positions(mesh, points):

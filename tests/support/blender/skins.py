@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 from support.blender import scenes
 from support.geometry.characters import FOOT, HIP, LEG, trousers
+from support.geometry.nudge import nudged
 
 import arapfields as af
 
@@ -20,7 +21,7 @@ def link(name, data):
 
 def mesh_of(name, vertices, triangles):
     mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(np.asarray(vertices).tolist(), [], np.asarray(triangles).tolist())
+    mesh.from_pydata(nudged(vertices).tolist(), [], np.asarray(triangles).tolist())
     return link(name, mesh)
 
 

@@ -2,11 +2,13 @@
 """A ball to stylize, and settings of quick solves."""
 
 import bpy
+from support.blender import scenes
 
 
 def ball(name="Ball"):
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
     bpy.context.object.name = name
+    scenes.nudge(bpy.context.object.data)
     return bpy.context.object
 
 

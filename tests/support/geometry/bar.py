@@ -2,6 +2,7 @@
 """A bar of size 4 × 1 × 1 along x with a handle at each end."""
 
 import numpy as np
+from support.geometry.nudge import nudged
 
 import arapfields as af
 
@@ -17,7 +18,7 @@ def bar_samples(count=6000, seed=0):
     normals = np.zeros((count, 3))
     normals[np.arange(count), axis] = side
     points[np.arange(count), axis] = side * half[axis]
-    return af.SurfaceSamples(points, normals)
+    return af.SurfaceSamples(nudged(points), normals)
 
 
 def box(center, half):

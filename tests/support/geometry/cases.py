@@ -4,6 +4,7 @@
 import functools
 
 import numpy as np
+from support.geometry.nudge import nudged
 from support.oracles.network import Network
 
 import arapfields as af
@@ -50,7 +51,7 @@ def bar_samples(count=1500, seed=0):
     points[np.arange(count), axis] = side
     normals = np.zeros((count, 3))
     normals[np.arange(count), axis] = side
-    return af.SurfaceSamples(points * size, normals, frame=af.Frame([0, 0, 0], 1.0))
+    return af.SurfaceSamples(nudged(points * size), normals, frame=af.Frame([0, 0, 0], 1.0))
 
 
 def bar_handles(degrees=60.0):

@@ -2,6 +2,7 @@
 """Simple bodies of capsules, and clothes, for tests of attached geometry."""
 
 import numpy as np
+from support.geometry.nudge import nudges
 
 import arapfields as af
 
@@ -40,6 +41,7 @@ def trousers():
     return Capsules(parts, af.Frame([0, 0, 0.6], 0.8))
 
 
+@nudges
 def ring(half_width, half_depth, heights, around, flare=0.0):
     """A skirt: vertices (heights · around, 3) of an elliptic tube about z, and its edges (e, 2).
 

@@ -7,6 +7,7 @@ import trimesh
 import arapfields as af
 
 from .bar import LEFT, RIGHT, turned
+from .nudge import nudged
 
 QUICK = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=150)
 DEEPEST = 0.004  # 0.1 % of the bar's length
@@ -16,7 +17,7 @@ DEEP = [LEFT, DOWN @ RIGHT]
 
 
 def solid(mesh, center):
-    return af.MeshSdf(mesh.vertices + np.array(center), mesh.faces)
+    return af.MeshSdf(nudged(mesh.vertices + np.array(center)), mesh.faces)
 
 
 BALL = solid(trimesh.creation.icosphere(3, 0.5), [1.2, 0, -1.2])

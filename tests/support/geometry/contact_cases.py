@@ -13,6 +13,7 @@ import arapfields as af
 from .cases import box, moved, shift, turn
 from .characters import Capsules
 from .meshes import read
+from .nudge import nudges
 
 VERTICES = 50_000
 
@@ -106,6 +107,7 @@ BODIES = {
 
 
 @cache
+@nudges
 def surface(name, data, vertices=VERTICES):
     """(vertices, triangles) with about as many vertices as asked for."""
     if name in BODIES:

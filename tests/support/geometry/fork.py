@@ -3,6 +3,7 @@
 
 import numpy as np
 from support.geometry.bar import box
+from support.geometry.nudge import nudged
 
 import arapfields as af
 
@@ -30,4 +31,4 @@ def fork_samples(count=8000, seed=0):
     round_ /= np.linalg.norm(round_, axis=1)[:, None]
     ends = np.c_[rng.choice([-BEND, BEND], count), np.zeros(count), np.full(count, LEG)]
     center[on_cap], normals[on_cap] = ends[on_cap], round_[on_cap]
-    return af.SurfaceSamples(center + RADIUS * normals, normals)
+    return af.SurfaceSamples(nudged(center + RADIUS * normals), normals)

@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from support.geometry.nudge import nudges
 
 
 def grid_triangles(rows, columns, wrap_rows=False, wrap_columns=False):
@@ -22,6 +23,7 @@ def grid_triangles(rows, columns, wrap_rows=False, wrap_columns=False):
     return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
 
 
+@nudges
 def torus(major=1.0, minor=0.4, around=48, tube=24):
     u = np.linspace(0, 2 * np.pi, around, endpoint=False)[:, None]
     v = np.linspace(0, 2 * np.pi, tube, endpoint=False)[None, :]
@@ -30,6 +32,7 @@ def torus(major=1.0, minor=0.4, around=48, tube=24):
     return points.reshape(-1, 3), grid_triangles(around, tube, True, True)
 
 
+@nudges
 def sphere(radius=1.0, subdivisions=3):
     """A subdivided octahedron with its vertices projected to the sphere."""
     vertices = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
@@ -53,6 +56,7 @@ def subdivide(vertices, triangles):
     return np.concatenate([vertices, middles]), np.concatenate([np.stack(p, 1) for p in parts])
 
 
+@nudges
 def box(half=(1.0, 1.0, 1.0)):
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * np.asarray(
         half, float
@@ -88,6 +92,7 @@ def read(path):
 
 
 @functools.cache
+@nudges
 def suzanne():
     """Blender's monkey: open at the eyes, with parts that intersect. Needs bpy, or a file with the mesh,
     ARAPFIELDS_SUZANNE, on processors for which there is no bpy."""

@@ -2,6 +2,7 @@
 """Figures of closed, intersecting parts, as game characters are built."""
 
 import numpy as np
+from support.geometry.nudge import nudges
 
 LEG = 0.1  # distance of a leg from the middle
 
@@ -22,6 +23,7 @@ def ellipsoid(center, radii, count):
     return points * radii + center, triangles
 
 
+@nudges
 def figure(count=24):
     """(vertices, triangles, part of each vertex): a head with a cavity, shoes that intersect."""
     hollow = ellipsoid((0, 0, 1.15), (0.33, 0.3, 0.27), count)

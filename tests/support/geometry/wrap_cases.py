@@ -3,6 +3,7 @@
 
 import numpy as np
 from support.geometry.meshes import sphere
+from support.geometry.nudge import nudges
 
 import arapfields as af
 
@@ -29,6 +30,7 @@ def star():
     return v, f, np.array(ends + [np.linalg.norm(v - place, axis=1).argmin() for place in beside])
 
 
+@nudges
 def tailed(curl, rings=80, around=16):
     """(n, 3), (m, 3), (8,): a body with two humps and a thin tail bent by `curl`; vertices at its nose, the
     tail's tip and six points between."""
