@@ -53,8 +53,9 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         if self.filepath or not has_window():
             return super().invoke(context, event)
         suffix = exporters.SUFFIXES[self.format]
-        name = caches.BARRED.sub("_", source_of(context).name)
-        self.filepath = bpy.path.abspath(f"//{name}{suffix}")
+        folder = Path(bpy.path.abspath("//"))
+        name = caches.file_name(source_of(context), context.scene, folder)
+        self.filepath = str(folder / f"{name}{suffix}")
         self.filter_glob, self.asked = f"*{suffix}", True
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
@@ -77,7 +78,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
 
     def places(self, context):
         suffix = exporters.SUFFIXES[self.format]
-        return {caches.cache_path(source_of(context), suffix, "//", self.filepath): False}
+        return {caches.cache_path(source_of(context), context.scene, suffix, "//", self.filepath): False}
 
     def plan_frames(self, context, job):
         if exporters.is_missing(self.format):

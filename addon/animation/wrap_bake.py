@@ -24,7 +24,7 @@ from ..solver.frame_solver import FrameSolver
 from ..solver.request import Request, flat
 from ..solver.setup import sampled
 from ..wrap import landmarks
-from .caches import BARRED, plain
+from .caches import file_name, plain
 from .frames import Frames
 from .object_bake import ObjectBake
 
@@ -116,7 +116,7 @@ class WrapBake(ObjectBake):
         self.marks = landmarks.Marks(source)
         self.values = effective_values(WRAP, settings_of(source).wrap)
         self.reports, self.left_out = {}, {}  # by frame; {error: its frames}
-        self.output = path or Path(bpy.app.tempdir, BARRED.sub("_", source.name))
+        self.output = path or Path(bpy.app.tempdir, file_name(source, context.scene, Path(bpy.app.tempdir)))
 
     def request(self, context):
         try:
