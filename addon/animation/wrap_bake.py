@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import bpy
 
-from ..blender import modifier_stack
+from ..blender import modifier_kinds, modifier_stack
 from ..blender.evaluation import depsgraph_of, world_matrix
 from ..blender.language import translated
 from ..blender.native_options import options_of
@@ -66,7 +66,7 @@ def put_after_armatures(item):
         return
     first = stack.index(cache)
     last = max((k for k, one in enumerate(stack) if one.type == "ARMATURE"), default=first)
-    if last > first and all(one.type in modifier_stack.KEEPING for one in stack[first:last]):
+    if last > first and all(map(modifier_kinds.keeps_vertices, stack[first:last])):
         item.modifiers.move(first, last)
 
 

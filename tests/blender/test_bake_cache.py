@@ -65,7 +65,10 @@ def test_several_objects_are_baked_in_one_pass_and_one_that_fails_stops_no_other
     plain.location.y = 3
     scenes.activate(plain, second, first)
     assert bpy.ops.arapfields.bake(start=1, end=3, scope="SELECTED") == {"FINISHED"}
-    assert sorted(path.name for path in (folder / "cache").iterdir()) == ["scene~Scene~One.pc2", "scene~Scene~Two.pc2"]
+    assert sorted(path.name for path in (folder / "cache").iterdir()) == [
+        "scene~Scene~One.pc2",
+        "scene~Scene~Two.pc2",
+    ]
     assert ("WARNING", "Plain: Drag a pin or add a handle first") in jobs.messages(), jobs.messages()
     for bar in (first, second):
         assert np.abs(at(bar, 3) - solved(bar, 3)).max() <= EXACT

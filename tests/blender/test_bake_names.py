@@ -85,7 +85,9 @@ def test_names_that_are_alike_become_different_files():
     for name in (*ALIKE, *(f"{'ü' * 30}{n}" for n in range(3))):
         bar.name = name
         path = caches.cache_path(bar, bpy.context.scene, ".pc2", "//")
-        assert path.parent == folder and len(path.name.encode()) < 250 and not set(path.name) & set('/\\:*?"<>|')
+        assert (
+            path.parent == folder and len(path.name.encode()) < 250 and not set(path.name) & set('/\\:*?"<>|')
+        )
         path.write_bytes(b"")
         found.add(path)
     assert len(found) == len(ALIKE) + 3
@@ -148,7 +150,9 @@ def test_carried_objects_keep_apart_from_objects_of_both_names():
         saved_animation(name, folder)
     scenes.activate(*(bpy.data.objects[name] for name in ("Bar", "Bar Hat", "Bar~Hat")))
     baked(scope="SELECTED")
-    played = [modifier_stack.find_cache(bpy.data.objects[n]).filepath for n in ("Bar", "Hat", "Bar Hat", "Bar~Hat")]
+    played = [
+        modifier_stack.find_cache(bpy.data.objects[n]).filepath for n in ("Bar", "Hat", "Bar Hat", "Bar~Hat")
+    ]
     assert len(set(played)) == 4 == len(list((folder / "cache").iterdir()))
     for name in ("Bar", "Hat"):
         bpy.data.objects[name].name = f"Old {name}"
