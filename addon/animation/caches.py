@@ -146,7 +146,7 @@ def digest(text):
 
 
 def file_name(source, scene, folder):
-    """The name, without extension, of what is stored of an object in a folder: it says file, scene and object.
+    """The name, without extension, of what is stored of an object in a folder: file, scene and object.
 
     Files in other folders may have the same name: where their outputs meet, it says whose they are.
     """

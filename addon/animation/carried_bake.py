@@ -210,7 +210,7 @@ SOLID = ("MESH", "CURVE", "SURFACE", "FONT", "META")  # objects whose shape ever
 
 
 def moved_twin(context, item, worlds, stack):
-    """A copy of an object, with its name, that moves by these world matrices until the ExitStack is closed."""
+    """A copy of an object, with its name, that moves by world matrices until the ExitStack is closed."""
     twin, name = item.copy(), item.name
     twin.animation_data_clear()
     twin.constraints.clear()

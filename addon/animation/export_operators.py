@@ -154,7 +154,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         )
 
     def holds(self, item):
-        """Whether the file holds a carried object: exporters leave out what is hidden, and kinds they lack."""
+        """Whether the file holds a carried object: exporters leave out what is hidden, and some kinds."""
         return item.visible_get() and item.type in exporters.HELD[self.format]
 
     def tell_of(self, unbaked, left_out):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What each kind of modifier does to a mesh, from which a new field modifier's place follows.
 
-A field acts on the shape that is seen, so it stands behind what makes or moves that shape. It stands before what
-only refines, hides or uses it, so that this follows the moved surface.
+A field acts on the shape that is seen, so it stands behind what makes or moves that shape. It stands before
+what only refines, hides or uses it, so that this follows the moved surface.
 """
 
 from dataclasses import dataclass
@@ -121,5 +121,5 @@ def keeps_vertices(modifier):
 
 
 def uses_surface(modifier):
-    """Whether what it does is bound to the surface where it stands, and stays there if the field comes later."""
+    """Whether what it does is bound to the surface where it stands, and stays if the field comes later."""
     return kind_of(modifier).role == USES

@@ -111,7 +111,7 @@ def test_a_new_object_does_not_take_the_cache_of_one_that_was_renamed():
     (cache,) = (folder / "cache").iterdir()
     content = cache.read_bytes()
     animated("Bar")
-    with pytest.raises(RuntimeError, match="scene~Scene~Bar.pc2 is there, and not of this object"):
+    with pytest.raises(RuntimeError, match=r"scene~Scene~Bar\.pc2 is there, and not of this object"):
         bpy.ops.arapfields.bake(start=1, end=2)
     assert cache.read_bytes() == content and tip(bar, 3) == height
     assert bpy.ops.arapfields.bake(start=1, end=2, overwrite=True) == {"FINISHED"}
@@ -161,6 +161,6 @@ def test_carried_objects_keep_apart_from_objects_of_both_names():
     hat = patch("Hat")
     scenes.activate(hat, bpy.data.objects["Bar"])
     bpy.ops.arapfields.carry()
-    with pytest.raises(RuntimeError, match="Bar.pc2, scene~Scene~Bar~Hat.pc2 is there"):
+    with pytest.raises(RuntimeError, match=r"Bar\.pc2, scene~Scene~Bar~Hat\.pc2 is there"):
         bpy.ops.arapfields.bake(start=1, end=2)
     assert content == {path: path.read_bytes() for path in (folder / "cache").iterdir()}

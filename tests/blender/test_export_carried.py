@@ -51,7 +51,7 @@ os._exit(7)
 
 
 def knight():
-    """A bar that carries meshes, and one as a whole, in a saved file; (bar, {name: carried object}, folder)."""
+    """A bar that carries meshes, one as a whole, in a saved file; (bar, {name: carried object}, folder)."""
     bar, folder = saved_animation()
     carried = {}
     for number in range(3):

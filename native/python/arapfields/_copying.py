@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copying and pickling: by constructors' arguments, by numbers, or as files; what belongs to its process is refused.
+"""Copying and pickling: by constructors' arguments or as files; what belongs to its process is refused.
 
 Samples, object styles and what a plane's solver gives have states of their own in the native module.
 """

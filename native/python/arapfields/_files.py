@@ -69,8 +69,8 @@ def write_arrays(file, **arrays):
 def read_arrays(file, names=None):
     """{name: array} of a NumPy archive, a path or bytes; sizes are checked before memory is asked for.
 
-    OSError for a path that cannot be read; InvalidInput that names it for an archive that is damaged, foreign,
-    or holds other names. Damaged ones make zipfile, its decompressors and NumPy raise exceptions of many kinds.
+    OSError for a path that cannot be read; InvalidInput that names it for an archive that is damaged,
+    foreign, or holds other names. For damage, zipfile, its decompressors and NumPy raise exceptions of many kinds.
     """
     place = "the archive" if isinstance(file, bytes) else str(file)
     if not isinstance(file, bytes):

@@ -3,8 +3,6 @@
 
 from pathlib import Path
 
-import numpy as np
-
 import arapfields as af
 
 from .._files import existing_file, json_text, read_arrays, write_arrays
