@@ -102,7 +102,8 @@ std::pair<SurfaceSamples, py::dict> samples_of_state(const py::tuple& parts) {
     validate(*mesh);
     samples.mesh = std::move(mesh);
   }
-  require(py::isinstance<py::dict>(state[7]), state.name(7), "got " + type_text(state[7]), "a dict is needed");
+  require(py::isinstance<py::dict>(state[7]), state.name(7), "got " + type_text(state[7]),
+          "a dict is needed");
   return {std::move(samples), py::reinterpret_borrow<py::dict>(state[7])};
 }
 

@@ -10,8 +10,8 @@
 
 namespace arapfields::python {
 
-/// The parts of a state. InvalidInput that names the class and the part where a damaged pickle holds something
-/// else.
+/// The parts of a state. InvalidInput that names the class and the part where a damaged pickle holds
+/// something else.
 class PickledState {
  public:
   PickledState(const py::tuple& parts, std::string kind, std::size_t count)

@@ -83,7 +83,10 @@ std::vector<Corners> corner_normals(const Points& vertices, const Triangles& tri
 
 struct ObjectStyle::Surface {
   Surface(PointsIn given, TrianglesIn faces, const Progress& progress)
-      : mesh{given, faces}, vertices(given), triangles(welded(given, faces)), hierarchy(vertices, triangles, progress) {
+      : mesh{given, faces},
+        vertices(given),
+        triangles(welded(given, faces)),
+        hierarchy(vertices, triangles, progress) {
     double volume = 0.0, area = 0.0;
     Vec3 moment = Vec3::Zero();
     for (Index i = 0; i < vertices.rows(); ++i)

@@ -55,8 +55,8 @@ class LoopBody {
   virtual std::string message(int count, double loss, double seconds_left) const = 0;
 };
 
-/// A loss, or what the last step gave, was NaN or infinite. The parameters are those of the last finite state,
-/// as is `result`.
+/// A loss, or what the last step gave, was NaN or infinite. The parameters are those of the last finite
+/// state, as is `result`.
 class LoopDiverged : public Diverged {
  public:
   LoopDiverged(const std::string& what, LoopResult last) : Diverged(what), result(std::move(last)) {}

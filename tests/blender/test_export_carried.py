@@ -42,7 +42,8 @@ for frame in map(int, frames):
             mesh.vertices.foreach_get("co", flat)
             world = np.array(evaluated.matrix_world)
             points = flat.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]
-            found.setdefault(item.name, {})[frame] = [points.min(axis=0).tolist(), points.max(axis=0).tolist()]
+            box = [points.min(axis=0).tolist(), points.max(axis=0).tolist()]
+            found.setdefault(item.name, {})[frame] = box
             evaluated.to_mesh_clear()
 json.dump(found, open(out, "w"))
 import os

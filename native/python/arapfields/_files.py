@@ -70,7 +70,7 @@ def read_arrays(file, names=None):
     """{name: array} of a NumPy archive, a path or bytes; sizes are checked before memory is asked for.
 
     OSError for a path that cannot be read; InvalidInput that names it for an archive that is damaged,
-    foreign, or holds other names. For damage, zipfile, its decompressors and NumPy raise exceptions of many kinds.
+    foreign, or holds other names: zipfile, its decompressors and NumPy raise exceptions of many kinds then.
     """
     place = "the archive" if isinstance(file, bytes) else str(file)
     if not isinstance(file, bytes):
