@@ -2,20 +2,26 @@
 """Stores for the frames of a bake, cache files or shape keys, and their sizes."""
 
 import contextlib
+import hashlib
 import os
 import re
+import sys
 from pathlib import Path
 
 import bpy
 
 from ..blender.language import translated
+from ..blender.object_references import settings_of
+from ..carried import played_points
 from ..core.errors import UserError, as_user_error
 from ..core.runtime.coroutines import Pause
-from ..field_modifier import cache_modifier
+from ..field_modifier import cache_modifier, inputs
 from ..results import result_objects
 
 SUFFIXES = {"PC2": ".pc2", "MDD": ".mdd"}
-BARRED = re.compile(r'[\x00-\x1f/\\:*?"<>|]')  # characters that file names cannot have
+SEPARATOR = "~"  # between the parts of a name
+BARRED = re.compile(r'[\x00-\x1f/\\:*?"<>|%~]')  # characters that parts of file names cannot have
+LONGEST = 200  # bytes of a name without extension; file systems take 255
 HEAVY = 500e6  # bytes of shape keys above which a cache is recommended
 
 
@@ -120,13 +126,50 @@ class CacheFile:
         cache_modifier.play(item, shown_path(self.path), self.frames.start, self.frames.step)
 
 
-def cache_path(source, suffix, folder, filepath=""):
+def encoded(name):
+    """A name as a part of a file's: what file names cannot have, and the characters between parts, by their
+    numbers, so that different names stay different."""
+    return BARRED.sub(lambda found: "".join(f"%{byte:02X}" for byte in found[0].encode()), name)
+
+
+def joined(*parts):
+    """The parts of a file's name, encoded; a long one ends in a digest of the whole."""
+    name = SEPARATOR.join(map(encoded, parts))
+    if len(name.encode(errors="surrogateescape")) <= LONGEST:
+        return name
+    kept = name.encode(errors="surrogateescape")[: LONGEST - 17].decode(errors="ignore")
+    return f"{kept}{SEPARATOR}{digest(name)}"
+
+
+def digest(text):
+    return hashlib.blake2b(text.encode(errors="surrogateescape"), digest_size=8).hexdigest()
+
+
+def file_name(source, scene, folder):
+    """The name, without extension, of what is stored of an object in a folder: file, scene and object.
+
+    Files in other folders may have the same name: where their outputs meet, it says whose they are.
+    """
+    file = Path(bpy.data.filepath)
+    parts = [file.stem if bpy.data.filepath else "untitled", scene.name, source.name]
+    if source.library is not None:  # a linked object's name may be that of a local one
+        parts.append(source.library.name)
+    if bpy.data.filepath and not folder.is_relative_to(file.parent):
+        try:
+            parts.append(digest(Path(os.path.relpath(file.parent, folder)).as_posix()))
+        except ValueError:  # on another drive
+            parts.append(digest(str(file.parent)))
+    return joined(*parts)
+
+
+def cache_path(source, scene, suffix, folder, filepath=""):
     """The absolute path of an object's cache, whose folder may be new; UserError if it cannot be used."""
-    name = BARRED.sub("_", source.name)
-    shown = filepath or f"{folder.rstrip('/') or '/'}/{name}{suffix}"
+    shown = filepath or folder
     if shown.startswith("//") and not bpy.data.filepath:
         raise UserError("Save the .blend first, or choose a folder: the cache lies beside it")
-    path = Path(bpy.path.abspath(shown))
+    path = Path(os.path.normpath(bpy.path.abspath(shown)))
+    if not filepath:
+        path = path / f"{file_name(source, scene, path)}{suffix}"
     if path.suffix.lower() != suffix:
         raise UserError("{path}: the format needs the extension {suffix}", path=path, suffix=suffix)
     folder = path.parent
@@ -137,7 +180,40 @@ def cache_path(source, suffix, folder, filepath=""):
 
 def cache_beside(path, name):
     """The path of a carried object's cache: beside the source's cache, with both names."""
-    return path.with_name(f"{path.stem} {BARRED.sub('_', name)}{path.suffix}")
+    stem = f"{path.stem}{SEPARATOR}{encoded(name)}"
+    if len(stem.encode(errors="surrogateescape")) > LONGEST:
+        stem = f"{path.stem[:60]}{SEPARATOR}{digest(stem)}"
+    return path.with_name(stem + path.suffix)
+
+
+def same_place(path):
+    """A value that two paths share where they are one file, as on systems that ignore case."""
+    return str(path).casefold() if sys.platform in ("win32", "darwin") else str(path)
+
+
+def plays(item, path):
+    """Whether an object plays the cache at that path."""
+    played = played_points.find(item)
+    if played is not None:
+        item = inputs.get(played, "Points") or item
+    return any(
+        one.type == "MESH_CACHE" and same_place(file_of(one, item)) == same_place(path)
+        for one in item.modifiers
+    )
+
+
+def file_of(modifier, item):
+    shown = bpy.path.abspath(modifier.filepath, library=item.library)
+    return Path(os.path.normpath(shown)) if modifier.filepath else Path()
+
+
+def is_own(item, path, named):
+    """Whether a cache at that path is an earlier bake of the object: it or its result plays it, or the name
+    was made of the object's (`named`) and no other object plays it."""
+    results = [entry.item for entry in settings_of(item).results if entry.item is not None]
+    if any(plays(one, path) for one in (item, *results)):
+        return True
+    return named and not any(plays(one, path) for one in bpy.data.objects)
 
 
 def shown_path(path):

@@ -8,6 +8,8 @@ frame; rigid objects and bones get keyframes.
 
 import contextlib
 
+import bpy
+
 from ..blender import modifier_stack, references
 from ..blender.actions import key_at
 from ..blender.language import translated
@@ -44,6 +46,7 @@ class CarriedBake:
     def __init__(self, carrying, frames, cache_of, fps, is_shared):
         self.carrying, self.frames, self.warnings = carrying, frames, []
         self.shapes, self.caches, self.keyed = {}, {}, {}  # by carried object; keyed: snapshots per frame
+        self.worlds = {}  # {carried object that moves as a whole: {frame: its world matrix}}
         if carrying.nodes is not None:
             name = carrying.source.name
             self.warnings.append(UserError("The field of {name} as nodes is not baked: it stands", name=name))
@@ -99,6 +102,10 @@ class CarriedBake:
                         carried.carrier.bind(context, item, entry)
                         carried.carrier.write(item, entry, self.shapes[carried][number])
                         self.keyed.setdefault(carried, []).append(carried.carrier.snapshot(item, entry))
+                    context.view_layer.update()
+                    for carried, (item, _, _) in bound.items():
+                        if not isinstance(carried.carrier, BonesCarrier):
+                            self.worlds.setdefault(carried, {})[frame] = item.matrix_world.copy()
                     yield Pause.REDRAW
         finally:
             with contextlib.suppress(ReferenceError):  # the file was left
@@ -128,6 +135,25 @@ class CarriedBake:
             except (UserError, OSError, RuntimeError) as error:
                 self.warnings.append(as_user_error(error))
         self.warnings += self.carrying.take_warnings()
+
+    def lend(self, context, source, stack):
+        """(objects that play the carried objects' frames until the ExitStack is closed, names of those that
+        cannot without a bake): for an export."""
+        players, missing = [], []
+        for carried in self.carrying.objects:
+            item, entry = carried.reference.find(), find(source, carried.reference.find())
+            if entry is None:
+                missing.append(carried.reference.name)
+            elif carried in self.caches and isinstance(carried.carrier, MeshCarrier):
+                self.caches[carried].commit()
+                stack.callback(cache_modifier.restore, item, cache_modifier.snapshot(item))
+                self.caches[carried].play_on(item)
+                players.append(item)
+            elif carried in self.worlds and item.type in SOLID:
+                players.append(moved_twin(context, item, self.worlds[carried], stack))
+            elif item.type != "EMPTY":
+                missing.append(item.name)
+        return players, missing
 
     def play(self, carried, item):
         self.caches[carried].commit()
@@ -178,6 +204,39 @@ class CarriedBake:
                 carried.carrier.restore(item, entry, state)
                 insert(item, carried.carrier, frame, turns)
                 yield Pause.REDRAW
+
+
+SOLID = ("MESH", "CURVE", "SURFACE", "FONT", "META")  # objects whose shape every exported file holds
+
+
+def moved_twin(context, item, worlds, stack):
+    """A copy of an object, with its name, that moves by world matrices until the ExitStack is closed."""
+    twin, name = item.copy(), item.name
+    twin.animation_data_clear()
+    twin.constraints.clear()
+    twin.parent, twin.rotation_mode = None, "QUATERNION"
+    twin.delta_location, twin.delta_scale = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+    twin.delta_rotation_euler, twin.delta_rotation_quaternion = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+    context.scene.collection.objects.link(twin)
+
+    def give_back():
+        action = twin.animation_data.action if twin.animation_data is not None else None
+        bpy.data.objects.remove(twin)
+        if action is not None and action.users == 0:
+            bpy.data.actions.remove(action)
+        item.name = name
+
+    stack.callback(give_back)
+    item.name, twin.name = f"{name}.own", name
+    turn = None
+    for frame, world in worlds.items():
+        twin.matrix_world = world
+        if turn is not None:
+            twin.rotation_quaternion.make_compatible(turn)
+        turn = twin.rotation_quaternion.copy()
+        for path in ("location", "rotation_quaternion", "scale"):
+            key_at(twin, path, frame)
+    return twin
 
 
 def remove(item, entry):

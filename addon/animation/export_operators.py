@@ -7,8 +7,8 @@ from pathlib import Path
 import bpy
 
 from ..blender.host import has_window
-from ..blender.language import translated
-from ..blender.object_references import ObjectReference, source_of
+from ..blender.language import about, translated
+from ..blender.object_references import ObjectReference, settings_of, source_of
 from ..blender.property_definitions import choice, path_text, text
 from ..core.errors import UserError
 from ..core.runtime.jobs import Item
@@ -53,8 +53,9 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         if self.filepath or not has_window():
             return super().invoke(context, event)
         suffix = exporters.SUFFIXES[self.format]
-        name = caches.BARRED.sub("_", source_of(context).name)
-        self.filepath = bpy.path.abspath(f"//{name}{suffix}")
+        folder = Path(bpy.path.abspath("//"))
+        name = caches.file_name(source_of(context), context.scene, folder)
+        self.filepath = str(folder / f"{name}{suffix}")
         self.filter_glob, self.asked = f"*{suffix}", True
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
@@ -77,7 +78,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
 
     def places(self, context):
         suffix = exporters.SUFFIXES[self.format]
-        return {caches.cache_path(source_of(context), suffix, "//", self.filepath): False}
+        return {caches.cache_path(source_of(context), context.scene, suffix, "//", self.filepath): False}
 
     def plan_frames(self, context, job):
         if exporters.is_missing(self.format):
@@ -121,17 +122,54 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         """Coroutine: plays the solved caches while the exporter runs, then restores the objects."""
         with contextlib.ExitStack() as stack:
             shown = {reference.uid: reference.get() for reference in self.items}
+            riders, unbaked, solved = [], [], set()
             for bake in self.frames_pass.bakes if self.frames_pass is not None else ():
                 if bake.error is not None:
                     raise bake.error
+                solved.add(bake.reference.uid)
+                yield from bake.carried.read_keyframes(context, bake.reference.get(), job)
                 shown[bake.reference.uid] = self.play(context, bake, stack)
-            yield from exporters.write(context, self.format, path, list(shown.values()), self.frames)
+                lent, left = bake.carried.lend(context, bake.reference.get(), stack)
+                riders, unbaked = riders + lent, unbaked + left
+                self.failures += [
+                    about(bake.name, reason) for reason in bake.carried.carrying.take_warnings()
+                ]
+            for reference in self.items:
+                if reference.uid not in solved:  # it and what it carries play their bakes
+                    entries = settings_of(reference.get()).carried
+                    riders += [entry.item for entry in entries if entry.item is not None]
+            items = [*shown.values(), *(item for item in dict.fromkeys(riders) if item not in shown.values())]
+            held = [item for item in items if item in shown.values() or self.holds(item)]
+            self.tell_of(unbaked, [item.name for item in items if item not in held and item.type != "EMPTY"])
+            yield from exporters.write(context, self.format, path, held, self.frames)
+        values = {
+            "count": exporters.count_of(self.format, self.frames),
+            "path": path.name,
+            "size": caches.size_text(path.stat().st_size),
+        }
+        if len(held) == 1:
+            return translated("{count} frames exported to {path} ({size})", **values)
         return translated(
-            "{count} frames exported to {path} ({size})",
-            count=exporters.count_of(self.format, self.frames),
-            path=path.name,
-            size=caches.size_text(path.stat().st_size),
+            "{count} frames of {objects} objects exported to {path} ({size})", objects=len(held), **values
         )
+
+    def holds(self, item):
+        """Whether the file holds a carried object: exporters leave out what is hidden, and some kinds."""
+        return item.visible_get() and item.type in exporters.HELD[self.format]
+
+    def tell_of(self, unbaked, left_out):
+        """Warns of carried objects that are not in the file."""
+        if unbaked:
+            names = ", ".join(unbaked)
+            self.warnings.append(translated("{names} is not in the file; bake, then export", names=names))
+        if left_out:
+            self.warnings.append(
+                translated(
+                    "{names} is not in the file: it is hidden, or {format} holds none of its kind",
+                    names=", ".join(left_out),
+                    format=LABELS[self.format],
+                )
+            )
 
     def play(self, context, bake, stack):
         """The object that plays a bake until the ExitStack is closed."""

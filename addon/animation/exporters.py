@@ -19,6 +19,8 @@ from .caches import plain, size_text
 from .frames import playing
 
 OPERATORS = {"ABC": ("wm", "alembic_export"), "USD": ("wm", "usd_export"), "GLTF": ("export_scene", "gltf")}
+MESHABLE = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+HELD = {"ABC": MESHABLE | {"CURVES"}, "USD": MESHABLE | {"CURVES", "POINTCLOUD"}, "GLTF": MESHABLE}  # kinds
 SUFFIXES = {"ABC": ".abc", "USD": ".usdc", "GLTF": ".glb"}
 
 
@@ -63,10 +65,8 @@ def require_room(context, path, items, frames):
     need, samples = 1e6, frames.count + (count_of("ABC", frames) if frames.step > 1 else 0)
     for item in items:
         mesh = item.evaluated_get(updated(context.view_layer)).data
-        moving, still = (
-            12 * (len(mesh.vertices) + len(mesh.loops)),
-            32 * (len(mesh.vertices) + len(mesh.loops)),
-        )
+        count = len(getattr(mesh, "vertices", ())) + len(getattr(mesh, "loops", ()))
+        moving, still = 12 * count, 32 * count
         need += samples * moving + still
     free = shutil.disk_usage(path.parent).free
     if free < need:
@@ -108,6 +108,7 @@ def gltf(context, path, frames):
         export_skins=False,
         export_morph=True,
         export_animations=True,
+        export_animation_mode="ACTIVE_ACTIONS",  # one animation of all objects, not one each
         export_frame_range=False,
         export_force_sampling=False,
         export_optimize_animation_size=False,

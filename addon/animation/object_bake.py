@@ -9,6 +9,7 @@ from ..blender.actions import has_keys
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError, as_user_error
+from ..field_modifier import unseen
 from ..handles import empties
 from ..live import sessions
 from ..results import placement, result_objects, visibility
@@ -167,6 +168,10 @@ class ObjectBake:
             )
         self.store.commit()
         sessions.end(context, source)  # the bake replaces the live shape
+        if self.in_place:
+            carried = [one.reference.find() for one in self.carried.carrying.objects]
+            for item in (source, *(one for one in carried if one is not None and one.type == "MESH")):
+                self.carried.warnings += unseen.standing(item)
         player = source if self.in_place else self.new_object(context, source, self.mesh(context, source))
         visibility.show_alone(source, player)
         self.store.play_on(player)

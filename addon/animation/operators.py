@@ -1,6 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-from pathlib import Path
-
 import bpy
 
 from ..blender import modifier_stack
@@ -8,6 +6,9 @@ from ..blender.language import about, translated
 from ..blender.object_references import settings_of, source_of
 from ..blender.property_definitions import effective_value, path_text
 from ..blender.source_operator import SourceOperator
+from ..carried.carried_objects import carrier_class
+from ..carried.carriers import MeshCarrier
+from ..carried.points import AttributeCarrier
 from ..core.errors import UserError
 from ..field_modifier import cache_modifier
 from . import caches, carried_bake
@@ -15,6 +16,13 @@ from .bake_operator import BakeOperator, effective_kind, refusal_of
 from .object_bake import ObjectBake
 from .properties import folder, settings
 from .wrap_bake import WrapBake, frames_of, scans_in
+
+
+def cached_with(source):
+    """The carried objects whose frames a bake of the source stores in caches of their own."""
+    entries = [entry for entry in settings_of(source).carried if entry.item is not None]
+    kinds = (MeshCarrier, AttributeCarrier)
+    return [entry.item for entry in entries if carrier_class(entry.item, entry.way) in kinds]
 
 
 class CacheOperator(BakeOperator):
@@ -30,20 +38,32 @@ class CacheOperator(BakeOperator):
         ),
     }
 
-    def path(self, source, active, values):
+    def path(self, context, source, active, values):
         """The path by cache_path(); None for shape keys."""
         suffix = caches.SUFFIXES.get(values["format"])
         if suffix is None:
             return None
         folder = effective_value("folder", settings_of(active).bake, self)
-        return caches.cache_path(source, suffix, folder, self.filepath)
+        return caches.cache_path(source, context.scene, suffix, folder, self.filepath)
 
     def places(self, context):
-        active, found, self.failures = source_of(context), {}, []
+        """UserError if two objects would share a file."""
+        active, found, owners, self.failures = source_of(context), {}, {}, []
         for source in self.sources(context):
-            path, cache = self.path(source, active, self.values(active)), modifier_stack.find_cache(source)
-            if path is not None:
-                found[path] = cache is not None and Path(bpy.path.abspath(cache.filepath)) == path
+            path = self.path(context, source, active, self.values(active))
+            if path is None:
+                continue
+            beside = [(one, caches.cache_beside(path, one.name)) for one in cached_with(source)]
+            for item, place in ((source, path), *beside):
+                other = owners.setdefault(caches.same_place(place), item)
+                if other != item:
+                    raise UserError(
+                        "{first} and {second} would share {path}; rename one",
+                        first=other.name,
+                        second=item.name,
+                        path=place.name,
+                    )
+                found[place] = caches.is_own(item, place, named=not self.filepath)
         return found
 
     def plan_frames(self, context, job):
@@ -52,9 +72,15 @@ class CacheOperator(BakeOperator):
         if self.filepath and len(sources) > 1:
             raise UserError("One file cannot take several objects; choose a folder")
         values = self.values(active)
+        taken = [path for path, own in self.places(context).items() if path.exists() and not own]
+        if taken and not self.overwrite:
+            names = ", ".join(path.name for path in taken)
+            raise UserError(
+                "{names} is there, and not of this object; overwrite=True replaces it", names=names
+            )
 
         def make(source, kind, frames):
-            path = self.path(source, active, values)
+            path = self.path(context, source, active, values)
             bake = self.bake_of(context, source, kind, frames, path, values)
             self.warn_of_weight(bake)
             return bake

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import bpy
 
-from ..blender import modifier_stack
+from ..blender import modifier_kinds, modifier_stack
 from ..blender.evaluation import depsgraph_of, world_matrix
 from ..blender.language import translated
 from ..blender.native_options import options_of
@@ -24,7 +24,7 @@ from ..solver.frame_solver import FrameSolver
 from ..solver.request import Request, flat
 from ..solver.setup import sampled
 from ..wrap import landmarks
-from .caches import BARRED, plain
+from .caches import file_name, plain
 from .frames import Frames
 from .object_bake import ObjectBake
 
@@ -66,7 +66,7 @@ def put_after_armatures(item):
         return
     first = stack.index(cache)
     last = max((k for k, one in enumerate(stack) if one.type == "ARMATURE"), default=first)
-    if last > first and all(one.type in modifier_stack.KEEPING for one in stack[first:last]):
+    if last > first and all(map(modifier_kinds.keeps_vertices, stack[first:last])):
         item.modifiers.move(first, last)
 
 
@@ -116,7 +116,7 @@ class WrapBake(ObjectBake):
         self.marks = landmarks.Marks(source)
         self.values = effective_values(WRAP, settings_of(source).wrap)
         self.reports, self.left_out = {}, {}  # by frame; {error: its frames}
-        self.output = path or Path(bpy.app.tempdir, BARRED.sub("_", source.name))
+        self.output = path or Path(bpy.app.tempdir, file_name(source, context.scene, Path(bpy.app.tempdir)))
 
     def request(self, context):
         try:

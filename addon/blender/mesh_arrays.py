@@ -22,6 +22,7 @@ class MeshArrays:
     triangles: np.ndarray  # (m, 3) int32
     has_free_normals: bool = False  # custom normals that do not rotate with the mesh
     splats: splat_layouts.Splats | None = None  # if the vertices are splats
+    materials: np.ndarray | None = None  # (m,) index of each triangle's material; None: the first
 
 
 def vectors(elements, name="vector"):
@@ -93,6 +94,24 @@ def triangles(mesh):
     return corners[flat].reshape(-1, 3)
 
 
+def materials_of(source, mesh):
+    """(m,) index, among the materials of the source's mesh, of each loop triangle of its evaluated mesh; None
+    where all have the first."""
+    own = list(source.data.materials)
+    if len(own) < 2 or not face_count(mesh):
+        return None
+    faces = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("material_index", faces)
+    shown = [None if one is None else one.original for one in mesh.materials]
+    if shown != own:  # modifiers have added some
+        known = [own.index(one) if one in own else 0 for one in shown] or [0]
+        faces = np.array(known, dtype=np.int32)[np.minimum(faces, len(known) - 1)]
+    mesh.calc_loop_triangles()
+    triangles = np.empty(len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("polygon_index", triangles)
+    return np.clip(faces[triangles], 0, len(own) - 1) if faces.any() else None
+
+
 def refusal(source):
     """UserError if an object has no geometry, without evaluating it; else None."""
     if source.modifiers or source.mode == "EDIT":
@@ -128,7 +147,9 @@ def read(context, source, in_place=False, frame=None):
 
 def arrays_of(source, mesh):
     """The MeshArrays of an object's evaluated mesh; UserError if it has no geometry."""
-    arrays = MeshArrays(positions(mesh), triangles(mesh), bool(modifier_stack.free_normals(mesh)))
+    normals = bool(modifier_stack.free_normals(mesh))
+    materials = materials_of(source, mesh) if source.type == "MESH" else None
+    arrays = MeshArrays(positions(mesh), triangles(mesh), normals, materials=materials)
     refuse(nothing_in_splats(source.name, mesh))
     if not np.isfinite(arrays.vertices).all():
         broken = np.flatnonzero(~np.isfinite(arrays.vertices).all(axis=1))
@@ -163,4 +184,6 @@ def fill(mesh, vertices, topology):
     data[".corner_vert"].data.foreach_set("value", topology.corners.ravel())
     data[".corner_edge"].data.foreach_set("value", topology.corner_edges.ravel())
     mesh.polygons.foreach_set("loop_start", np.arange(0, topology.corners.size, 3, dtype=np.int32))
+    if topology.materials is not None:
+        mesh.polygons.foreach_set("material_index", topology.materials)
     mesh.update()

@@ -10,6 +10,7 @@ import bpy
 
 from ..core.errors import UserError
 from ..names import FIELD_GROUP, LAYER_GROUP
+from . import modifier_kinds
 from .evaluation import is_disabled, updated
 from .object_references import settings_of
 from .removal import remove_modifier
@@ -18,17 +19,8 @@ from .splat_layouts import holds_splats
 STAGE = "arapfields_stage"  # custom property of the scene that holds the copy
 TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")  # render settings that map frames to time
 FREE_NORMALS = "custom_normal"  # attribute of custom normals; free ones are vectors, Blender 4.5 and later
-# Modifiers at the end of a stack that a new field modifier is put before: they refine the shape.
-REFINING = {"SUBSURF", "MULTIRES", "BEVEL", "SOLIDIFY", "EDGE_SPLIT", "WEIGHTED_NORMAL", "NORMAL_EDIT"}
-REFINING |= {"TRIANGULATE", "WIREFRAME"}
 # Modifiers before which Blender allows deform modifiers only; nodes count as others.
 ORIGINAL = {"MULTIRES", "SOFT_BODY"}
-# Modifiers that keep every vertex and its index.
-KEEPING = {"ARMATURE", "CAST", "CLOTH", "COLLISION", "CORRECTIVE_SMOOTH", "CURVE", "DATA_TRANSFER"}
-KEEPING |= {"DISPLACE", "HOOK", "LAPLACIANDEFORM", "LAPLACIANSMOOTH", "LATTICE", "MESH_CACHE", "MESH_DEFORM"}
-KEEPING |= {"NORMAL_EDIT", "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH", "SOFT_BODY", "SURFACE_DEFORM"}
-KEEPING |= {"UV_PROJECT", "UV_WARP", "VERTEX_WEIGHT_EDIT", "VERTEX_WEIGHT_MIX", "VERTEX_WEIGHT_PROXIMITY"}
-KEEPING |= {"WARP", "WAVE", "WEIGHTED_NORMAL"}
 
 
 def find(source):
@@ -65,7 +57,8 @@ def top(source):
 
 def place(source):
     """Index of the field modifier in the stack, or the index for a new one: that of the cache modifier, else
-    before modifiers that only refine the shape, or before armatures if the unposed shape is solved."""
+    before modifiers that only refine, hide or use the shape (modifier_kinds), or before armatures if the
+    unposed shape is solved."""
     stack = list(source.modifiers)
     own = next((index for index, one in enumerate(stack) if is_field(one) or is_cache(one)), None)
     if own is not None:
@@ -77,11 +70,10 @@ def place(source):
 
 
 def end(stack):
-    """Index for a new deform modifier at the end of a stack, before modifiers that only refine the shape."""
+    """Index for a new deform modifier at the end of a stack, before modifiers that only refine, hide or use
+    the shape."""
     index, least = len(stack), earliest(stack)
-    while index > least and (
-        stack[index - 1].type in REFINING or getattr(stack[index - 1], "use_pin_to_last", False)
-    ):
+    while index > least and modifier_kinds.follows_field(stack[index - 1]):
         index -= 1
     return index
 
@@ -137,6 +129,12 @@ def is_posing(source, modifier):
     )
 
 
+def left_behind(source):
+    """The modifiers that use the surface before the field moves it, such as hair, and so do not follow it."""
+    stack = list(source.modifiers)[: place(source)]
+    return [one for one in stack if one.show_viewport and modifier_kinds.uses_surface(one)]
+
+
 def shown_before(source, in_place):
     return [modifier for modifier in before(source, in_place) if modifier.show_viewport]
 
@@ -149,7 +147,7 @@ def behind(source):
 def keeps_vertices(source):
     """Whether the vertices at the field's place are the mesh's own, by index, in viewport and render."""
     return all(
-        modifier.type in KEEPING or is_layer(modifier)
+        modifier_kinds.keeps_vertices(modifier) or is_layer(modifier)
         for modifier in before(source, in_place=True)
         if modifier.show_viewport or modifier.show_render
     )

@@ -86,6 +86,9 @@ def copy_modifiers(item, given):
     item.modifiers.clear()
     for one in given:
         made = item.modifiers.new(one.name, one.type)
+        if one.type == "PARTICLE_SYSTEM":  # new ones have hair of their own
+            made.particle_system.settings = one.particle_system.settings
+            made.particle_system.seed = one.particle_system.seed
         for path in paths_of(one):
             with contextlib.suppress(TypeError):  # an enum without items, whose value is ""
                 put_at(made, path, one.path_resolve(path))

@@ -5,7 +5,6 @@ import base64
 import binascii
 import io
 import tempfile
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,12 +56,14 @@ def to_bytes(pose):
 def from_bytes(content, name):
     """The pose from a file's bytes; UserError that names the file if they are invalid."""
     af = native.library()
+    from arapfields._files import read_arrays
+
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            if int(file["version"]) != VERSION:
-                raise UserError("{name} was written by a newer version", name=name)
-            matrix = np.array(file["local_to_solve"], dtype=np.float64).reshape(4, 4)
-            points, normals, written = file["points"], file["normals"], file["field"].tobytes()
+        file = read_arrays(content)
+        if int(file["version"]) != VERSION:
+            raise UserError("{name} was written by a newer version", name=name)
+        matrix = np.array(file["local_to_solve"], dtype=np.float64).reshape(4, 4)
+        points, normals, written = file["points"], file["normals"], file["field"].tobytes()
         if not np.isfinite(matrix).all() or not abs(np.linalg.det(matrix)) > 0:
             raise UserError("{name} holds no pose", name=name)
         with tempfile.TemporaryDirectory() as folder:
@@ -70,7 +71,7 @@ def from_bytes(content, name):
             path.write_bytes(written)
             field = af.DeformationField.load(str(path))
         return Pose(field, af.SurfaceSamples(points, normals, field.frame), matrix)
-    except (KeyError, ValueError, OSError, EOFError, TypeError, zipfile.BadZipFile) as error:
+    except (KeyError, ValueError, OSError, TypeError) as error:
         raise UserError("{name} holds no pose", name=name) from error
 
 

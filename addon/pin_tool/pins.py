@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..blender import modifier_stack, object_references
+from ..blender import modifier_kinds, modifier_stack, object_references
 from ..blender.language import translated
 from ..blender.object_references import owner_of, settings_of
 from ..blender.property_definitions import listeners
@@ -113,7 +113,7 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
 def warn_of_moves(source):
     """Warns that a modifier after the field moves the clicked surface."""
     later = list(source.modifiers)[modifier_stack.place(source) + 1 :]
-    moving = [one for one in later if one.show_viewport and one.type not in modifier_stack.REFINING]
+    moving = [one for one in later if one.show_viewport and not modifier_kinds.follows_field(one)]
     if moving:
         error = UserError(
             "{name}: the modifier {modifier} moves the shape after the field; the pin stands before that",

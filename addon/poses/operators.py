@@ -8,6 +8,7 @@ from ..blender.property_definitions import number, path_text, text
 from ..blender.source_operator import ReportingOperator, SourceOperator
 from ..core import poses
 from ..core.errors import UserError
+from ..core.runtime import native
 from . import applying
 
 SUFFIX = ".arappose"
@@ -129,13 +130,14 @@ class ARAPFIELDS_OT_export_pose(PoseFile, OfPose, bpy.types.Operator):
 
     def change(self, context, source):
         entry = chosen(context, "")
-        path = Path(bpy.path.abspath(self.filepath)).with_suffix(SUFFIX)
-        partial = path.with_name(f"{path.name}.partial")
-        try:
+        native.library()
+        from arapfields._files import whole_file
+
+        path = Path(bpy.path.abspath(self.filepath))
+        if path.suffix.lower() != SUFFIX:
+            path = path.with_name(path.name + SUFFIX)  # of a.1 and a.2 as well
+        with whole_file(path) as partial:
             partial.write_bytes(poses.from_text(entry.data, entry.name))
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
         return translated("{name} kept", name=path.name)
 
 

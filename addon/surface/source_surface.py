@@ -13,7 +13,7 @@ from ..blender.splat_layouts import Splats
 from ..blender.vertex_groups import NearestVertices
 from ..core.errors import UserError
 from ..core.geometry import rotations
-from ..core.geometry.edges import build_edges
+from ..core.geometry.edges import build_edges, most_frequent
 from ..core.geometry.spaces import Space, space_of
 from ..core.runtime import native
 from ..handles import subdivided
@@ -38,6 +38,7 @@ class SourceSurface:
     solids: list  # (vertices, triangles) of carried meshes to sample as well
     splats: Splats | None = None  # attributes of the vertices
     shown: tuple | None = None  # ((m, 3) points of the surface, (m, 3) shown) of a subdivided one
+    materials: np.ndarray | None = None  # (m,) index of each triangle's material; None: the first
 
     @cached_property
     def _exact_surface(self):
@@ -102,14 +103,27 @@ class SourceSurface:
         sdf = self.implicit(tracker, weight)
         mesh = native.library().extract_surface(sdf, **extraction, task=tracker.start("Extracting", 1.0))
         warn_of_pieces(tracker, mesh.report)
-        return checked_mesh(*mesh)
+        return self.checked(*mesh, self.vertices)
 
     def extract_moved(self, tracker, field, **extraction):
         """The same of the deformed surface, by marching cubes in deformed space; and figures of a report."""
         sdf, task = self.implicit(tracker, 0.0), tracker.start("Extracting", 1.0)
         mesh = native.library().extract_deformed(sdf, field, **extraction, task=task)
         warn_of_pieces(tracker, mesh.report)
-        return *checked_mesh(*mesh), {name: mesh.report[name] for name in ("inverted", "failures")}
+        figures = {name: mesh.report[name] for name in ("inverted", "failures")}
+        return *self.checked(*mesh, field(self.vertices)), figures
+
+    def checked(self, vertices, corners, moved):
+        """The vertices and the topology of a surface. Its triangles have the materials of the nearest ones of
+        the mesh, with the mesh's vertices `moved`."""
+        if not len(corners):
+            raise UserError("The fitted surface is empty; fit with more quality")
+        materials = None
+        if self.materials is not None:
+            own = moved, self.triangles
+            nearest = native.library().Correspondence(moved, own, (vertices, corners)).triangles
+            materials = most_frequent(self.materials[nearest][corners])
+        return vertices, build_edges(corners, materials)
 
 
 def warn_of_pieces(tracker, report):
@@ -122,12 +136,6 @@ def warn_of_pieces(tracker, report):
                 **figures,
             )
         )
-
-
-def checked_mesh(vertices, corners):
-    if not len(corners):
-        raise UserError("The fitted surface is empty; fit with more quality")
-    return vertices, build_edges(corners)
 
 
 def in_world_shape(splats, space, source):
@@ -164,5 +172,6 @@ def read_surface(
         stiffness=(None, None) if carrying is None else painted.read(context, source, in_place),
         solids=[] if carrying is None else carrying.solids(context, space),
         splats=in_world_shape(mesh.splats, space, source),
+        materials=mesh.materials,
         shown=None if carrying is None else subdivided.read(context, source, in_place, below, space.to_solve),
     )

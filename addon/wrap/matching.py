@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack
+from ..blender import mesh_arrays, modifier_kinds, modifier_stack
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import is_in_place, transform
@@ -22,7 +22,7 @@ LOOKED_AT = 1000  # most vertices to measure the distance of two surfaces
 
 
 def keeps_vertices(modifier):
-    return modifier.type in modifier_stack.KEEPING or modifier_stack.is_field(modifier)
+    return modifier_kinds.keeps_vertices(modifier) or modifier_stack.is_field(modifier)
 
 
 def seen(context, source, target, is_posed):

@@ -23,7 +23,14 @@ An open MeshSdf is a sheet, which nothing passes from either side.)")
            "`margin`: the distance that is kept, in mesh units. `placement` (4, 4) turns, moves and scales "
            "the "
            "function's space. Nothing passes an obstacle whose placement moves from step to step.")
-      .def_readonly("margin", &Obstacle::margin, "The distance that is kept.");
+      .def_property_readonly(
+          "function",
+          [](const Obstacle& self) {
+            return std::const_pointer_cast<ImplicitFunction>(self.function);  // Python changes none
+          },
+          "The ImplicitFunction.")
+      .def_readonly("margin", &Obstacle::margin, "The distance that is kept.")
+      .def_readonly("placement", &Obstacle::placement, "(4, 4) from the function's to mesh coordinates.");
   py::class_<Contact>(module, "Contact", R"(
 What a surface does not pass: obstacles, a ground at a height along `up`, and itself.
 
@@ -42,6 +49,11 @@ For deform, stylize and LiveDeformer. Handles whose targets lie beyond give way:
           "itself"_a = false, "friction"_a = Contact().friction,
           "`up` (3,) is z unless given. `itself`: parts do not pass each other, but for what touches or "
           "overlaps at rest. `friction`: Coulomb's coefficient at obstacles and the ground, in step() alone.")
+      .def_property_readonly(
+          "obstacles", [](const Contact& self) { return py::tuple(py::cast(self.obstacles)); },
+          "The Obstacles.")
+      .def_readonly("up", &Contact::up, "(3,) the direction in which the ground's height counts.")
+      .def_readonly("friction", &Contact::friction, "Coulomb's coefficient at obstacles and the ground.")
       .def_readonly("itself", &Contact::itself, "Whether parts of the shape do not pass each other.")
       .def_readonly("ground", &Contact::ground, "The ground's height, or None.");
 }

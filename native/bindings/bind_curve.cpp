@@ -3,6 +3,7 @@
 #include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
+#include "bindings/pickling.h"
 #include "curve/deform_curve.h"
 #include "energies/arap2d.h"
 #include "sampling/curve_samples.h"
@@ -30,6 +31,27 @@ py::array_t<double> jacobian(const CurveSolution& self, const ArrayArgument& poi
   return result;
 }
 
+CurveReport report_of_state(const py::tuple& parts) {
+  const PickledState state(parts, "CurveReport", 8);
+  return {state.number(0), state.number(1), state.number(2), state.number(3),
+          state.number(4), state.index(5),  state.number(6), state.number(7) != 0.0};
+}
+
+CurveSolution field_of_state(const py::tuple& parts) {
+  const PickledState state(parts, "CurveField", 6);
+  CurveSolution solution;
+  solution.field.center = state.matrix(0, 2, 1);
+  solution.field.scale = state.number(1);
+  require_positive(state.name(1), solution.field.scale);
+  solution.field.basis.centers = state.matrix(2, -1, 2);
+  solution.field.basis.radii = state.matrix(3, solution.field.basis.centers.rows(), 1);
+  require((solution.field.basis.radii.array() > 0.0).all(), state.name(3), "some are not positive",
+          "all must be");
+  solution.field.coefficients = state.matrix(4, solution.field.basis.size(), 2);
+  solution.report = state.of<CurveReport>(5, "CurveReport");
+  return solution;
+}
+
 template <class Scalar>
 void bind_testing(py::module_& testing) {
   using Array = py::array_t<Scalar, py::array::c_style>;
@@ -53,7 +75,14 @@ void bind_curve(py::module_& module) {
   py::class_<CurveSamples>(module, "CurveSamples", "Samples of a plane curve, in order along it.")
       .def_readonly("points", &CurveSamples::points, "(n, 2)")
       .def_readonly("normals", &CurveSamples::normals,
-                    "(n, 2) unit normals: outward of a closed curve, right-hand of an open one.");
+                    "(n, 2) unit normals: outward of a closed curve, right-hand of an open one.")
+      .def(py::pickle([](const CurveSamples& self) { return py::make_tuple(self.points, self.normals); },
+                      [](const py::tuple& parts) {
+                        const PickledState state(parts, "CurveSamples", 2);
+                        CurveSamples samples{state.matrix(0, -1, 2), {}};
+                        samples.normals = state.matrix(1, samples.points.rows(), 2);
+                        return samples;
+                      }));
   module.def(
       "sample_curve",
       [](const ArrayArgument& vertices, Index count, bool closed) {
@@ -99,7 +128,13 @@ Samples of a plane curve, by index, that follow a rigid motion.
       .def_readonly("min_determinant", &CurveReport::min_determinant, "Smallest det J at the samples.")
       .def_readonly("iterations", &CurveReport::iterations, "Quasi-Newton steps taken.")
       .def_readonly("loss", &CurveReport::loss, "Reached: stretch + bending · bend, handles, smoothness.")
-      .def_readonly("converged", &CurveReport::converged, "A further step would gain next to nothing.");
+      .def_readonly("converged", &CurveReport::converged, "A further step would gain next to nothing.")
+      .def(py::pickle(
+          [](const CurveReport& self) {
+            return py::make_tuple(self.stretch, self.bend, self.handle_error_mean, self.handle_error_max,
+                                  self.min_determinant, self.iterations, self.loss, self.converged ? 1 : 0);
+          },
+          &report_of_state));
 
   py::class_<CurveSolution>(module, "CurveField",
                             "A deformation of the plane, made for a curve by deform_curve.")
@@ -110,7 +145,14 @@ Samples of a plane curve, by index, that follow a rigid motion.
           },
           "points"_a, "(p, 2) → (p, 2), in the curve's coordinates.")
       .def("jacobian", &jacobian, "points"_a, "(p, 2, 2), [p, i, k] = ∂f_i/∂x_k.")
-      .def_readonly("report", &CurveSolution::report);
+      .def_readonly("report", &CurveSolution::report)
+      .def(py::pickle(
+          [](const CurveSolution& self) {
+            const CurveField& field = self.field;
+            return py::make_tuple(Eigen::MatrixXd(field.center), field.scale, field.basis.centers,
+                                  Eigen::MatrixXd(field.basis.radii), field.coefficients, self.report);
+          },
+          &field_of_state));
 
   module.def(
       "deform_curve",

@@ -80,6 +80,10 @@ triangles are allowed. InvalidInput for a broken mesh.)")
           },
           "points"_a, "Unit gradients (p, 3) of the distance, pointing outwards; on a triangle, its normal.")
       .def_property_readonly("frame", &MeshSdf::frame, "The Frame of the unit cube, as in fit_sdf.")
+      .def_property_readonly(
+          "vertices", [](const MeshSdf& sdf) { return sdf.vertices(); }, "(n, 3) of the soup.")
+      .def_property_readonly(
+          "triangles", [](const MeshSdf& sdf) { return sdf.triangles(); }, "(m, 3) of the soup.")
       .def_property_readonly("closed", &MeshSdf::continuous, "Whether the soup is closed.")
       .def(
           "save",

@@ -3,6 +3,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/jet_arrays.h"
+#include "bindings/pickling.h"
 #include "energies/arap.h"
 #include "energies/body.h"
 #include "energies/composed_probe.h"
@@ -242,7 +243,16 @@ void bind_energies(py::module_& module) {
       .def_readonly("min_determinant", &Distortion::min_determinant, "Smallest det J.")
       .def_readonly("flipped_share", &Distortion::flipped_share, "Share of samples with det J ≤ 0.")
       .def_readonly("max_stretch", &Distortion::max_stretch, "Largest singular value of J.")
-      .def_readonly("min_stretch", &Distortion::min_stretch, "Smallest singular value of J.");
+      .def_readonly("min_stretch", &Distortion::min_stretch, "Smallest singular value of J.")
+      .def(py::pickle(
+          [](const Distortion& self) {
+            return py::make_tuple(self.min_determinant, self.flipped_share, self.max_stretch,
+                                  self.min_stretch);
+          },
+          [](const py::tuple& parts) {
+            const PickledState state(parts, "Distortion", 4);
+            return Distortion{state.number(0), state.number(1), state.number(2), state.number(3)};
+          }));
 
   py::module_ testing = testing_module(module);
   py::class_<BoundHandles>(testing, "BoundHandles")
@@ -312,6 +322,16 @@ leaves no surface is kept.)")
           "orientation"_a, "The object rotated by `orientation` (3, 3) about its centroid.")
       .def_property_readonly("centroid", &ObjectStyle::centroid,
                              "(3,) centroid of the solid, in mesh coordinates.")
+      .def(py::pickle(
+          [](const ObjectStyle& self) {
+            return py::make_tuple(self.mesh().vertices, self.mesh().triangles, self.turn());
+          },
+          [](const py::tuple& parts) {
+            const PickledState state(parts, "ObjectStyle", 3);
+            const TriangleMesh mesh{state.points(0), as_triangles(state[1], state.name(1))};
+            const Mat3 turn = as_rotation(state[2], state.name(2));
+            return run_long([&] { return ObjectStyle(mesh.vertices, mesh.triangles).turned(turn); });
+          }))
       .def("__repr__", [](const ObjectStyle&) { return "ObjectStyle()"; });
 }
 

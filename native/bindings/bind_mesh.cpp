@@ -2,6 +2,7 @@
 #include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
+#include "bindings/pickling.h"
 #include "bindings/reports.h"
 #include "mesh/sample_mesh.h"
 #include "options/sampling.h"
@@ -67,6 +68,52 @@ Vector or_ones(const Vector& weights, Index count) {
   return weights.size() > 0 ? weights : Vector::Ones(count);
 }
 
+/// All but `redraw`, which is a function.
+py::tuple state_of(const py::object& self) {
+  const auto& s = self.cast<const SurfaceSamples&>();
+  py::object mesh = py::none();
+  if (s.mesh) mesh = py::make_tuple(s.mesh->vertices, s.mesh->triangles);
+  return py::make_tuple(s.points, s.normals, s.frame, s.weights, s.bend_weights,
+                        py::array_t<std::int32_t>(py::array(py::cast(s.mesh_indices))), mesh,
+                        self.attr("__dict__"));
+}
+
+std::pair<SurfaceSamples, py::dict> samples_of_state(const py::tuple& parts) {
+  const PickledState state(parts, "SurfaceSamples", 8);
+  SurfaceSamples samples;
+  samples.points = state.points(0);
+  const Index count = samples.size();
+  require(count > 0, state.name(0), "there are none", "at least one is needed");
+  samples.normals = state.matrix(1, count, 3);
+  require((samples.normals.rowwise().squaredNorm().array() < 1.001).all(), state.name(1),
+          "some are longer than 1", "unit normals are needed");
+  samples.frame = state.of<Frame>(2, "Frame");
+  samples.weights = state.vector(3), samples.bend_weights = state.vector(4);
+  require_weights(state.name(3), samples.weights, count);
+  require_weights(state.name(4), samples.bend_weights, count);
+  for (const Index mesh : as_indices(state[5], state.name(5))) {
+    require(mesh >= 0 && mesh <= INT32_MAX, state.name(5), std::to_string(mesh), "an index is needed");
+    samples.mesh_indices.push_back(static_cast<std::int32_t>(mesh));
+  }
+  require(samples.mesh_indices.empty() || std::ssize(samples.mesh_indices) == count, state.name(5),
+          std::to_string(samples.mesh_indices.size()) + " of them", "one for each sample is needed");
+  if (state.has(6)) {
+    auto mesh = std::make_shared<TriangleMesh>(as_mesh_pair(state[6], state.name(6)));
+    validate(*mesh);
+    samples.mesh = std::move(mesh);
+  }
+  require(py::isinstance<py::dict>(state[7]), state.name(7), "got " + type_text(state[7]),
+          "a dict is needed");
+  return {std::move(samples), py::reinterpret_borrow<py::dict>(state[7])};
+}
+
+/// A copy that can be drawn anew, as its original can.
+py::object copied(const py::object& self) {
+  py::object result = py::cast(SurfaceSamples(self.cast<const SurfaceSamples&>()));
+  result.attr("__dict__").attr("update")(self.attr("__dict__"));
+  return result;
+}
+
 std::string text(const Frame& frame) {
   return py::cast<std::string>(
       py::str("center=({:g}, {:g}, {:g}), scale={:g}")
@@ -81,7 +128,7 @@ void bind_mesh(py::module_& module) {
 Points distributed uniformly by area over a rest surface, with outward unit normals.
 
 Arrays are in mesh coordinates. `frame` maps them to the unit cube in which fields and energies live; fields
-solved on the samples inherit it.)")
+solved on the samples inherit it. Unpickled samples are not drawn anew (DeformOptions.fresh_samples).)")
       .def(py::init(&checked_samples), "points"_a, "normals"_a, "frame"_a = py::none(), py::kw_only(),
            "weights"_a = py::none(), "bend_weights"_a = py::none(),
            R"(
@@ -127,6 +174,9 @@ mean w (stretch + λ b bend). InvalidInput for other counts, and for negative or
           "report", [](const py::object& self) { return SampleReportResult(report_of(self)); },
           "The SampleReport of sample_surface; AttributeError for other samples.")
       .def("__len__", [](const SurfaceSamples& s) { return s.size(); })
+      .def(py::pickle(&state_of, &samples_of_state))
+      .def("__copy__", &copied)
+      .def("__deepcopy__", [](const py::object& self, const py::object&) { return copied(self); })
       .def("__repr__", [](const SurfaceSamples& s) {
         return "SurfaceSamples(" + std::to_string(s.size()) + " points, " + text(s.frame) + ")";
       });

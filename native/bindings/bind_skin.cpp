@@ -2,6 +2,7 @@
 #include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
+#include "bindings/pickling.h"
 #include "skin/correctives.h"
 #include "skin/rig_shape.h"
 #include "skin/skin_weights.h"
@@ -53,6 +54,14 @@ std::vector<Mat4> as_motions(const ArraysArgument& motions) {
   return result;
 }
 
+Corrective corrective_of_state(const py::tuple& parts) {
+  const PickledState state(parts, "Corrective", 3);
+  Corrective corrective{state.index(0), {}, state.points(2)};
+  const Eigen::MatrixXd coefficients = state.matrix(1, 9, 1);
+  std::copy_n(coefficients.data(), 9, corrective.coefficients.begin());
+  return corrective;
+}
+
 }  // namespace
 
 void bind_skin(py::module_& module) {
@@ -71,6 +80,7 @@ components of its rotation vector in its own axes, in radians.)")
       .def_readonly("roll", &Bone::roll)
       .def_property_readonly("box", &bone_box, "(4, 4) the cube [-1, 1]³ → a box along it, in its axes.")
       .def_readonly("deform", &Bone::deform)
+      .def_readonly("limits", &Bone::limits, "(3, 2), or None.")
       .def_readonly("name", &Bone::name)
       .def("__repr__", [](const Bone& self) { return "Bone(" + self.name + ")"; });
   module.def("skin_weights", &weights_of, "mesh"_a, "bones"_a,
@@ -94,7 +104,13 @@ sample_mesh. Raises InvalidInput and Cancelled.)");
           [](const Corrective& self, const ArrayArgument& rotation) {
             return self.value(as_rotation(rotation, "rotation"));
           },
-          "rotation"_a, "Its value for a rotation (3, 3) of the bone in its own axes; 0 at rest.");
+          "rotation"_a, "Its value for a rotation (3, 3) of the bone in its own axes; 0 at rest.")
+      .def(py::pickle(
+          [](const Corrective& self) {
+            const Eigen::Map<const Eigen::Matrix<double, 9, 1>> coefficients(self.coefficients.data());
+            return py::make_tuple(self.bone, Eigen::MatrixXd(coefficients), self.offsets);
+          },
+          &corrective_of_state));
   module.def(
       "skin_correctives",
       [](const ArrayArgument& vertices, const ArrayArgument& triangles, const BonesArgument& bones,

@@ -95,14 +95,20 @@ FieldResult stylize_samples(const SurfaceSamples& samples, const NormalsArgument
 
 InverseResult inverse_of(const DeformationField& field, const SurfaceSamples& samples,
                          InverseTrainingOptions options, Task* task) {
-  const Solution solution =
-      run_long(task, [&](const Progress& p) { return train_inverse(field, samples, options, p); });
-  py::object result = py::cast(solution.field);
-  const SolveReport& r = solution.report;
-  attach_report(
-      result, make_report("InverseReport", "error_mean"_a = r.handle_mean[0], "error_max"_a = r.handle_max[0],
-                          "iterations"_a = r.loop.iterations, "seconds"_a = r.loop.seconds));
-  return result;
+  const auto reported = [](const Solution& solution) {
+    py::object result = py::cast(solution.field);
+    const SolveReport& r = solution.report;
+    attach_report(result, make_report("InverseReport", "error_mean"_a = r.handle_mean[0],
+                                      "error_max"_a = r.handle_max[0], "iterations"_a = r.loop.iterations,
+                                      "seconds"_a = r.loop.seconds));
+    return result;
+  };
+  try {
+    return reported(
+        run_long(task, [&](const Progress& p) { return train_inverse(field, samples, options, p); }));
+  } catch (const SolveDiverged& error) {
+    raise_diverged(error, reported(error.last_good));
+  }
 }
 
 FieldMeasures measures(const DeformationField& field, const ArrayArgument& points) {
@@ -157,7 +163,8 @@ A network that approximates the inverse of a field, as a DeformationField.
 
 It is trained so that the field maps its values back (the paper's cycle loss), at deformed samples and in
 their bounding box, and on the samples' own pairs. report is an InverseReport. For exact inverses of single
-points use field.inverse.)");
+points use field.inverse. Raises InvalidInput, Cancelled and Diverged, whose `last_good` is the last network
+with finite numbers.)");
   module.def("backend", &backend_name,
              "What does dense products: the ARAPFIELDS_BACKEND that the library was built with.");
   module.def("device_report", &device_report,

@@ -21,11 +21,13 @@ void require_range(std::string_view argument, double value, double low, double h
 }
 
 void require_positive(std::string_view argument, double value) {
-  require(std::isfinite(value) && value > 0.0, argument, number_text(value), "must be positive");
+  require(std::isfinite(value) && value > 0.0, argument, number_text(value),
+          std::isnan(value) || value > 0.0 ? "must be positive and finite" : "must be positive");
 }
 
 void require_not_negative(std::string_view argument, double value) {
-  require(std::isfinite(value) && value >= 0.0, argument, number_text(value), "must not be negative");
+  require(std::isfinite(value) && value >= 0.0, argument, number_text(value),
+          value < 0.0 ? "must not be negative" : "must be a finite number, 0 or more");
 }
 
 }  // namespace arapfields

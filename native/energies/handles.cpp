@@ -13,6 +13,8 @@ namespace arapfields {
 namespace {
 
 constexpr double rigid_tolerance = 1e-3;
+/// Lengths whose volumes doubles hold, by far: this and its inverse.
+constexpr double shortest = 1e-100;
 /// Volume of a target's box over the cube of its longest edge, below which it counts as flat.
 constexpr double least_volume = 1e-9;
 
@@ -66,7 +68,10 @@ Mat4 Handle::motion(Index index) const {
   require(is_affine(rest) && is_affine(target), name_of(index), "a last row other than 0 0 0 1",
           "both matrices must be affine");
   const Mat3 box = rest.topLeftCorner<3, 3>();
-  const double extent = box.colwise().norm().maxCoeff();
+  const double extent = box.colwise().stableNorm().maxCoeff();
+  require(extent < 1.0 / shortest && (extent == 0.0 || extent > shortest), name_of(index),
+          "its rest box has a side of " + number_text(extent),
+          number_text(shortest) + " to " + number_text(1.0 / shortest) + " is allowed");
   require(extent > 0.0 && std::abs(box.determinant()) > 1e-12 * extent * extent * extent, name_of(index),
           "its rest box is flat", "the rest pose needs a volume");
   const Mat3 linear = target.topLeftCorner<3, 3>() * box.inverse();

@@ -83,7 +83,10 @@ std::vector<Corners> corner_normals(const Points& vertices, const Triangles& tri
 
 struct ObjectStyle::Surface {
   Surface(PointsIn given, TrianglesIn faces, const Progress& progress)
-      : vertices(given), triangles(welded(given, faces)), hierarchy(vertices, triangles, progress) {
+      : mesh{given, faces},
+        vertices(given),
+        triangles(welded(given, faces)),
+        hierarchy(vertices, triangles, progress) {
     double volume = 0.0, area = 0.0;
     Vec3 moment = Vec3::Zero();
     for (Index i = 0; i < vertices.rows(); ++i)
@@ -170,6 +173,7 @@ struct ObjectStyle::Surface {
     return exit;
   }
 
+  TriangleMesh mesh;  // as it was given
   Points vertices;
   Triangles triangles;
   Hierarchy hierarchy;
@@ -185,6 +189,8 @@ ObjectStyle ObjectStyle::turned(const Mat3& turn) const {
   result.turn_ = turn * turn_;
   return result;
 }
+
+const TriangleMesh& ObjectStyle::mesh() const { return surface_->mesh; }
 
 Vec3 ObjectStyle::centroid() const { return surface_->hierarchy.restored(surface_->centroid); }
 

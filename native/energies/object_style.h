@@ -5,6 +5,7 @@
 
 #include "core/task.h"
 #include "core/types.h"
+#include "mesh/triangle_mesh.h"
 
 namespace arapfields {
 
@@ -22,6 +23,9 @@ class ARAPFIELDS_EXPORT ObjectStyle {
   Points normals(PointsIn directions, double smoothing = usual_smoothing) const;
   /// The same object rotated about its centroid.
   ObjectStyle turned(const Mat3& turn) const;
+  /// The mesh that it was made of, and its rotation.
+  const TriangleMesh& mesh() const;
+  const Mat3& turn() const { return turn_; }
   /// The solid's centroid, in mesh coordinates.
   Vec3 centroid() const;
 

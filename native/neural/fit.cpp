@@ -82,6 +82,9 @@ class Fit final : public LoopBody {
     mlp_.pull_back((sign(off) / static_cast<double>(options_.training.batch)).view({1, -1, 1}));
     return error_ = mean(abs(off));
   }
+  bool is_finite() override {
+    return std::isfinite(errors(mlp_, held_out_.points, held_out_.distances).mean);
+  }
   bool is_good_enough() override {
     if (options_.target_error <= 0) return false;
     const Index some = std::min<Index>(held_out_.near_count, 4096);

@@ -48,7 +48,8 @@ class Run {
         progress_(progress),
         optimizer_(trained, options.training, options.optimizer),
         losses_(trained.parameters),
-        good_(trained.parameters.clone()) {}
+        start_(trained.parameters.clone()),
+        good_(start_.clone()) {}
 
   LoopResult operator()() {
     const CancelScope scope(progress_);
@@ -83,7 +84,7 @@ class Run {
       }
     }
     read_losses();
-    if (!all_finite(trained_.parameters)) diverge(iteration);
+    if (!all_finite(trained_.parameters) || !body_.is_finite()) diverge(iteration);
     result_.seconds = watch_.seconds();
     progress_.report(1.0);
     return result_;
@@ -132,6 +133,10 @@ class Run {
 
   [[noreturn]] void diverge(int iteration) {
     trained_.parameters.assign(good_);
+    if (good_iteration_ > 0 && !body_.is_finite()) {
+      trained_.parameters.assign(start_);
+      good_iteration_ = 0;
+    }
     result_.stopped_by = StopReason::divergence;
     result_.iterations = good_iteration_;
     result_.seconds = watch_.seconds();
@@ -149,7 +154,7 @@ class Run {
   const Stopwatch watch_;
   Optimizer optimizer_;
   Losses losses_;
-  Tensor good_;
+  Tensor start_, good_;
   int good_iteration_ = 0;
   double last_ = 0.0, smooth_ = 0.0, reported_ = -1.0;
   LoopResult result_;

@@ -42,6 +42,9 @@ class LoopBody {
   /// Adds the gradient of the estimate to the gradient, which is zero before; returns the estimate, a scalar
   /// on the device where it was computed. Called for each step of an iteration.
   virtual Tensor accumulate(int iteration) = 0;
+  /// Whether what the current parameters give is finite wherever it is used: parameters and the losses of
+  /// subsets may be where values or derivatives elsewhere are not. Called for what the loop is to return.
+  virtual bool is_finite() = 0;
   /// Whether the current parameters suffice; called about every ten iterations.
   virtual bool is_good_enough() { return false; }
   /// After each iteration, of which `count` are done.
@@ -52,7 +55,8 @@ class LoopBody {
   virtual std::string message(int count, double loss, double seconds_left) const = 0;
 };
 
-/// A loss became NaN or infinite. The parameters are those of the last finite state, as is `result`.
+/// A loss, or what the last step gave, was NaN or infinite. The parameters are those of the last finite
+/// state, as is `result`.
 class LoopDiverged : public Diverged {
  public:
   LoopDiverged(const std::string& what, LoopResult last) : Diverged(what), result(std::move(last)) {}

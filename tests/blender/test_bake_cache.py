@@ -26,10 +26,10 @@ def test_a_cache_plays_what_the_solver_says_at_every_frame():
     bpy.context.scene.frame_set(3)
     assert bpy.ops.arapfields.bake(start=1, end=5, subframes=2) == {"FINISHED"}
     assert bpy.context.scene.frame_current == 3
-    path = folder / "cache/Bar.pc2"
+    path = folder / "cache/scene~Scene~Bar.pc2"
     assert path.stat().st_size == 32 + 9 * 12 * len(bar.data.vertices)
     (modifier,) = bar.modifiers
-    assert modifier.type == "MESH_CACHE" and modifier.filepath == "//cache/Bar.pc2"
+    assert modifier.type == "MESH_CACHE" and modifier.filepath == "//cache/scene~Scene~Bar.pc2"
     shown = drawn()["ARAPFIELDS_PT_animation"]
     assert "ARAP Fields Cache" in shown and "250 samples, 1.2 MB" in shown, shown
     for frame in (1, 2.5, 4, 5):
@@ -65,7 +65,10 @@ def test_several_objects_are_baked_in_one_pass_and_one_that_fails_stops_no_other
     plain.location.y = 3
     scenes.activate(plain, second, first)
     assert bpy.ops.arapfields.bake(start=1, end=3, scope="SELECTED") == {"FINISHED"}
-    assert sorted(path.name for path in (folder / "cache").iterdir()) == ["One.pc2", "Two.pc2"]
+    assert sorted(path.name for path in (folder / "cache").iterdir()) == [
+        "scene~Scene~One.pc2",
+        "scene~Scene~Two.pc2",
+    ]
     assert ("WARNING", "Plain: Drag a pin or add a handle first") in jobs.messages(), jobs.messages()
     for bar in (first, second):
         assert np.abs(at(bar, 3) - solved(bar, 3)).max() <= EXACT
@@ -99,7 +102,7 @@ def test_outputs_that_are_no_modifier_play_on_an_object_of_their_own():
         bpy.context.view_layer.objects.active = bar
     item = bpy.data.objects["Bar_baked"]
     assert [m.type for m in item.modifiers] == ["MESH_CACHE"] and bar.hide_render and not bar.modifiers
-    assert (folder / "cache/Bar.pc2").stat().st_size == 32 + 2 * 12 * len(item.data.vertices)
+    assert (folder / "cache/scene~Scene~Bar.pc2").stat().st_size == 32 + 2 * 12 * len(item.data.vertices)
     rise = at(item, 5) - at(item, 1)
     right = at(item, 1)[:, 0] > 0.9
     assert np.abs(rise[right][:, 2] - 0.4).max() < 0.1 and np.abs(rise[at(item, 1)[:, 0] < -0.9]).max() < 0.1

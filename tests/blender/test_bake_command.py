@@ -73,7 +73,7 @@ def test_an_object_that_is_disabled_in_viewports_is_baked_as_one_that_is_shown(b
     for name in ("shown", "itself", "collection"):
         for objects in ((), ("--objects", "Bar")):
             command("bake", "-i", tmp_path / f"{name}.blend", "--folder", tmp_path / name, *objects)
-            caches[name, objects] = (tmp_path / name / "Bar.pc2").read_bytes()
+            caches[name, objects] = (tmp_path / name / f"{name}~Scene~Bar.pc2").read_bytes()
         command("bake", "-i", tmp_path / f"{name}.blend", "-o", tmp_path / f"{name}_baked.blend")
         blender.call(__file__, "is_disabled_as_it_was", {"folder": tmp_path, "name": name})
     assert len(set(caches.values())) == 1, {key: hash(value) for key, value in caches.items()}
@@ -90,23 +90,23 @@ def test_parts_in_any_order_make_the_cache_that_one_process_makes(scene, user_fo
         return done
 
     run("-o", folder / "baked.blend")
-    whole = (folder / "cache/Bar.pc2").read_bytes()
+    whole, name = (folder / "cache/scene~Scene~Bar.pc2").read_bytes(), "scene~Scene~Bar.pc2"
     assert len(whole) == 32 + 5 * 12 * 386 and (folder / "baked.blend").exists()
     shared = folder / "shared"
     shared.mkdir()
     parts = ["--folder", shared, "--shard"]
     said = run(*parts, "2/3").stdout
     assert "3 of 5 frames to come" in said  # of 2 and 5
-    assert not (shared / "Bar.pc2").exists()
-    frames = sorted((shared / ".Bar.pc2.frames").iterdir())
+    assert not (shared / name).exists()
+    frames = sorted((shared / f".{name}.frames").iterdir())
     kept = [path for path in frames if path.name != "lock"]
     kept[0].unlink()  # as if it had been killed before it came to that frame
     stamps = {path: path.stat().st_mtime_ns for path in kept[1:]}
     run(*parts, "3/3"), run(*parts, "2/3")
     assert all(path.stat().st_mtime_ns == stamp for path, stamp in stamps.items())  # solved once
     run(*parts, "1/3")
-    assert (shared / "Bar.pc2").read_bytes() == whole
-    assert [path.name for path in shared.iterdir()] == ["Bar.pc2"]
+    assert (shared / name).read_bytes() == whole
+    assert [path.name for path in shared.iterdir()] == [name]
 
 
 def test_an_export_and_what_cannot_be_baked(scene, command):

@@ -22,22 +22,22 @@ pytestmark = pytest.mark.in_blender
 def test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays():
     _, folder = saved_animation()
     bpy.ops.arapfields.bake(start=1, end=3)
-    path = folder / "cache/Bar.pc2"
+    path = folder / "cache/scene~Scene~Bar.pc2"
     good = path.read_bytes()
 
     def fails(text, **arguments):
         with pytest.raises(RuntimeError, match=text):
             bpy.ops.arapfields.bake(**arguments)
-        assert path.read_bytes() == good and [p.name for p in path.parent.iterdir()] == ["Bar.pc2"]
+        assert path.read_bytes() == good and [p.name for p in path.parent.iterdir()] == [path.name]
 
     fails("The last frame, 3, comes before the first, 7", start=7, end=3)
     fails("no such folder", start=1, end=2, filepath="//gone/too/Bar.pc2")
     fails("needs the extension .mdd", start=1, end=2, format="MDD", filepath="//cache/Bar.pc2")
     with files_of_at_most(9000):
-        fails("Bar.pc2", start=1, end=5)
+        fails(path.name, start=1, end=5)
     operator = stepped(format="PC2", start=1, end=5, folder="//cache")
     assert cancelled_at(operator, "frame 3") == {"CANCELLED"}
-    assert path.read_bytes() == good and os.listdir(path.parent) == ["Bar.pc2"]
+    assert path.read_bytes() == good and os.listdir(path.parent) == [path.name]
     for handle in ("Fixed", "Moving"):
         bpy.data.objects[handle].animation_data_clear()
     fails("Nothing that moves Bar is animated", range="HANDLES")
@@ -72,7 +72,7 @@ def test_a_bake_that_no_longer_fits_is_named():
     bar.data.vertices[0].co.x += 0.1
     assert "mesh changed since the bake" in str(played.problem(bar, look_closely=True))
     bar.data.vertices[0].co.x -= 0.1
-    (folder / "cache/Bar.pc2").rename(folder / "cache/moved.pc2")
+    (folder / "cache/scene~Scene~Bar.pc2").rename(folder / "cache/moved.pc2")
     assert "is not there" in str(played.problem(bar))
     bar.modifiers[0].filepath = "//cache/moved.pc2"
     content = (folder / "cache/moved.pc2").read_bytes()

@@ -202,7 +202,7 @@ def test_an_export_that_fails_is_named_and_changes_nothing(kind):
         assert path.read_bytes() == b"before"
         for one, other in zip(state(bar), before, strict=True):
             assert one == other, (name, one, other)
-    (folder / "cache/Bar.pc2").unlink()
+    (folder / "cache/scene~Scene~Bar.pc2").unlink()
     with pytest.raises(RuntimeError, match="is not there"):
         bpy.ops.arapfields.export_animation(format=kind, filepath=str(path))
     with pytest.raises(RuntimeError, match="no such folder"):

@@ -35,7 +35,7 @@ def swelling_bar():
         key.value = value
         key.keyframe_insert("value", frame=frame)
     bpy.context.scene.frame_set(1)
-    return bar, folder / "cache/Bar.pc2"
+    return bar, folder / "cache/scene~Scene~Bar.pc2"
 
 
 def begun(operator):
@@ -151,7 +151,7 @@ def test_a_cache_is_found_from_where_the_file_was_saved_meanwhile():
     (path.parents[1] / "later").mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(path.parents[1] / "later/scene.blend"))
     assert advanced(running) == {"FINISHED"}
-    assert bar.modifiers[0].filepath == "//../cache/Bar.pc2" and played.problem(bar) is None
+    assert bar.modifiers[0].filepath == f"//../cache/{path.name}" and played.problem(bar) is None
 
 
 def test_a_bake_says_that_it_lost_a_handle():

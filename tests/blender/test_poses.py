@@ -54,6 +54,47 @@ def saved(source):
     return float(np.linalg.norm(scenes.world_points(source) - rest, axis=1).max())
 
 
+def damaged(content):
+    """Bytes like a file's, damaged in many ways."""
+    random = np.random.default_rng(0)
+    yield from (b"", b"x", content[:-1], content[: len(content) // 2], content[7:], content + b"x")
+    yield np.lib.format.magic(1, 0) + b"\x10\0" + b"{" * 16
+    for _ in range(200):
+        flipped = bytearray(content)
+        for at in random.integers(len(content), size=random.integers(1, 7)):
+            flipped[at] ^= 1 << random.integers(8)
+        yield bytes(flipped)
+    for at in range(0, 140, 3):  # the first entry's header
+        yield content[:at] + bytes([content[at] ^ 0xFF]) + content[at + 1 :]
+
+
+def test_a_damaged_pose_is_refused_in_one_sentence():
+    saved(creature("Body", 6))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "bent.arappose")
+        assert bpy.ops.arapfields.export_pose(filepath=str(path)) == {"FINISHED"}
+        content, refused = path.read_bytes(), 0
+        for number, changed in enumerate(damaged(content)):
+            path.write_bytes(changed)
+            try:
+                bpy.ops.arapfields.import_pose(filepath=str(path))
+            except RuntimeError as error:
+                refused += 1
+                assert "bent.arappose" in str(error) and "Traceback" not in str(error), number
+        assert refused > 200
+
+
+def test_poses_whose_names_end_alike_get_files_of_their_own():
+    saved(creature("Body", 6))
+    with tempfile.TemporaryDirectory() as folder:
+        (beside := Path(folder, "jump.1.arappose.partial")).write_text("somebody's own")
+        for name in ("jump.1", "jump.2", "jump.arappose", "Leap.ARAPPOSE"):
+            assert bpy.ops.arapfields.export_pose(filepath=str(Path(folder, name))) == {"FINISHED"}
+        names = {path.name for path in Path(folder).iterdir()} - {beside.name}
+        assert names == {"jump.1.arappose", "jump.2.arappose", "jump.arappose", "Leap.ARAPPOSE"}
+        assert beside.read_text() == "somebody's own"
+
+
 def test_a_pose_fits_other_resolutions():
     source = creature("Body", 50)
     assert len(source.data.vertices) == 20_000

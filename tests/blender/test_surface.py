@@ -89,6 +89,43 @@ def test_extraction_lies_on_the_source_in_world_space():
     assert not any(face.use_smooth for face in bpy.data.objects["Bar_implicit"].data.polygons)
 
 
+def striped(bar):
+    """Gives the bar's right half the second of three materials, and its tip the third."""
+    for name in ("left", "right", "tip"):
+        bar.data.materials.append(bpy.data.materials.new(name))
+    centers = np.array([face.center.x for face in bar.data.polygons])
+    indices = (centers > 0).astype(np.int32) + (centers > 0.7)
+    bar.data.polygons.foreach_set("material_index", indices)
+
+
+def stripes(item, rest_of=lambda points: points):
+    """The share of an object's faces with the material of their place at rest."""
+    centers = rest_of(np.array([face.center for face in item.data.polygons]))[:, 0]
+    names = np.array([item.material_slots[face.material_index].material.name for face in item.data.polygons])
+    expected = np.where(centers > 0.75, "tip", np.where(centers > 0, "right", "left"))
+    near = np.abs(centers[:, None] - [0.0, 0.75]).min(axis=1) < 0.08  # a face of the grid
+    assert set(names) == {"left", "right", "tip"}
+    return np.mean((names == expected)[~near])
+
+
+@pytest.mark.parametrize("result", ["NEW", "REPLACE"])
+@pytest.mark.parametrize("output", ["SURFACE", "REMESH"])
+def test_a_new_surface_has_the_materials_where_the_mesh_has_them(output, result):
+    bar, _, moving = scenes.bar_with_handles()
+    striped(bar)
+    moving.location.y += 0.1
+    bar.modifiers.new("Finer", "SUBSURF").subdivision_type = "SIMPLE"
+    bpy.ops.arapfields.extract(resolution=40, surface="EXACT")
+    assert stripes(bpy.context.view_layer.objects.active) == 1.0
+    scenes.activate(bar)
+    settings = scenes.QUICK | {"result": result, "resolution": 40}
+    assert bpy.ops.arapfields.deform(output=output, surface="EXACT", **settings) == {"FINISHED"}
+    item = bpy.context.view_layer.objects.active
+    assert (item == bar) == (result == "REPLACE") and len(item.data.polygons) > 1000
+    assert [slot.material.name for slot in item.material_slots] == ["left", "right", "tip"]
+    assert stripes(item) == 1.0  # a bar that bends to the side keeps its x, but for some hundredths
+
+
 def test_the_surface_is_deformed_like_the_mesh():
     bar, _, moving = scenes.bar_with_handles()
     for name, value in FIT.items():

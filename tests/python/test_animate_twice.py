@@ -101,3 +101,13 @@ def test_a_point_cache_is_read_from_several_threads(tmp_path):
         for thread in threads:
             thread.join()
     assert not wrong
+
+
+def test_a_foreign_file_among_the_frames_stays(place):
+    store = place / ".x.pc2.frames"
+    assert run(*flags(place, "--shard", "1/2")) == 0
+    for name in ("notes.txt", "0000001-mine", "0000001-" + "x" * 32):
+        (store / name).write_text("kept")
+    assert run(*flags(place)) == 0
+    left = {path.name for path in store.iterdir() if not path.name.startswith("lock")}
+    assert left == {"notes.txt", "0000001-mine", "0000001-" + "x" * 32}

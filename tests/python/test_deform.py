@@ -182,6 +182,31 @@ def test_time_budget_ends_the_run(samples):
     assert field.report.out_of_time and 0 < field.report.iterations < 10_000_000
 
 
+NETWORKS = {"neural": {}, "with its inverse": {"invertibility": 1.0}, "invertible": {"field": "invertible"}}
+
+
+@pytest.mark.parametrize("iterations", [1, 2, 11])
+@pytest.mark.parametrize("optimizer", ["muon", "adam"])
+@pytest.mark.parametrize("kind", [*NETWORKS, "style", "inverse"])
+def test_steps_to_infinity_end_in_numbers_or_a_divergence(samples, kind, optimizer, iterations):
+    wild = dict(iterations=iterations, learning_rate=1e30, optimizer=optimizer, width=16, layers=2, batch=20)
+    try:
+        if kind == "style":
+            kept = af.stylize(samples, "cube", af.StylizeOptions(field="neural", **wild))
+        elif kind == "inverse":
+            field = af.deform(samples, cases.bar_handles(), af.DeformOptions(iterations=3))
+            kept = af.train_inverse(field, samples, af.InverseTrainingOptions(**wild))
+        else:
+            options = af.DeformOptions(**{"field": "neural"} | NETWORKS[kind] | wild)
+            kept = af.deform(samples, cases.bar_handles(), options)
+    except af.Diverged as error:
+        assert "learning_rate" in str(error)
+        kept = error.last_good
+    assert np.isfinite(kept(samples.points)).all() and np.isfinite(kept.hessian(samples.points)).all()
+    figures = [value for value in kept.report.to_dict().values() if isinstance(value, float)]
+    assert figures and np.isfinite(figures).all()
+
+
 def test_divergence_keeps_the_last_good_state(samples):
     with pytest.raises(af.Diverged, match="iteration") as caught:
         af.deform(samples, cases.bar_handles(), quick(learning_rate=1e30, optimizer="adam"))

@@ -105,6 +105,18 @@ def test_leaving_the_finite_numbers_keeps_the_last_good_state(ball):
     assert np.isfinite(good(ball[0])).all() and good.report.stopped_by == "diverged"
 
 
+@pytest.mark.parametrize("iterations", [1, 2, 11])
+@pytest.mark.parametrize("rate", [1e30, 1e12])
+def test_a_last_step_to_infinity_is_a_divergence(ball, rate, iterations):
+    options = {**QUICK, "batch": 1, "iterations": iterations, "learning_rate": rate}
+    try:
+        kept = af.fit_sdf(*ball, af.FitOptions(**options))
+    except af.Diverged as error:
+        kept = error.last_good
+    assert np.isfinite(kept(ball[0])).all()
+    assert np.isfinite([kept.report.near_mean, kept.report.near_max, kept.report.volume_max]).all()
+
+
 def test_a_fit_survives_its_file(fitted, tmp_path):
     fitted.save(tmp_path / "ball.safetensors")
     loaded = af.NeuralSdf.load(tmp_path / "ball.safetensors")

@@ -3,6 +3,7 @@
 
 import codecs
 import contextlib
+import io
 import json
 import math
 import os
@@ -11,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ._native import InvalidInput, OutputFile
+from ._native import InvalidInput, OutputFile, require_memory
 
 
 @contextlib.contextmanager
@@ -63,6 +64,47 @@ def write_arrays(file, **arrays):
         for name, array in arrays.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
                 np.lib.format.write_array(entry, np.asanyarray(array), allow_pickle=False)
+
+
+def read_arrays(file, names=None):
+    """{name: array} of a NumPy archive, a path or bytes; sizes are checked before memory is asked for.
+
+    OSError for a path that cannot be read; InvalidInput that names it for an archive that is damaged,
+    foreign, or holds other names: zipfile, its decompressors and NumPy raise exceptions of many kinds then.
+    """
+    place = "the archive" if isinstance(file, bytes) else str(file)
+    if not isinstance(file, bytes):
+        require_memory(place, 2.0 * os.path.getsize(file))
+        file = Path(file).read_bytes()
+    arrays = {}
+    try:
+        with zipfile.ZipFile(io.BytesIO(file)) as archive:
+            for entry in archive.infolist():
+                name = entry.filename.removesuffix(".npy")
+                if names is not None and name not in names:
+                    raise InvalidInput(f"{place}: unknown array {name!r:.40}; known are {sorted(names)}")
+                require_memory(place, 2.0 * entry.file_size)
+                with archive.open(entry) as content:
+                    arrays[name] = _array(content, entry.file_size)
+    except InvalidInput:
+        raise
+    except Exception as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InvalidInput(f"{place}: not readable as a NumPy archive, perhaps damaged ({reason})") from error
+    return arrays
+
+
+def _array(file, size):
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, fortran, kind = read(file)
+    count = 1
+    for length in shape:
+        count *= length
+    if kind.hasobject or any(length < 0 for length in shape) or file.tell() + count * kind.itemsize != size:
+        raise ValueError("an array's header does not fit its content")
+    array = np.frombuffer(file.read(), kind)
+    return array.reshape(shape[::-1]).T if fortran else array.reshape(shape)
 
 
 def json_text(value, indent=None):

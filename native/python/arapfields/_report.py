@@ -2,6 +2,7 @@
 """The base class of reports, and the argument of callbacks."""
 
 import dataclasses
+import functools
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -52,3 +53,7 @@ class Iteration:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "terms", MappingProxyType(dict(self.terms)))
+
+    def __reduce__(self) -> tuple[Any, tuple[()]]:
+        given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return functools.partial(type(self), **(given | {"terms": dict(self.terms)})), ()

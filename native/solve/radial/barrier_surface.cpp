@@ -19,6 +19,9 @@ constexpr int most_evaluations = 150;
 constexpr double least_slope = 1e-3;
 /// Relative tolerance of a placement's uniform scale.
 constexpr double even = 1e-5;
+/// Lengths in mesh units beyond which an obstacle is out of reach of any arithmetic: where single precision
+/// ends.
+constexpr double farthest = 1e38;
 
 }  // namespace
 
@@ -26,7 +29,7 @@ void require_contact(const Contact& contact) {
   for (std::size_t i = 0; i < contact.obstacles.size(); ++i) {
     const std::string name = "obstacles[" + std::to_string(i) + "]";
     require(contact.obstacles[i].function != nullptr, name, "no function", "an implicit function is needed");
-    require_not_negative(name + ".margin", contact.obstacles[i].margin);
+    require_range(name + ".margin", contact.obstacles[i].margin, 0.0, farthest);
   }
   for (std::size_t i = 0; i < contact.obstacles.size(); ++i) {
     const Mat4& place = contact.obstacles[i].placement;
@@ -36,10 +39,14 @@ void require_contact(const Contact& contact) {
                 (linear.transpose() * linear - size * size * Mat3::Identity()).norm() < even * size * size,
             "obstacles[" + std::to_string(i) + "].placement", "no turn, shift and even scale",
             "a (4, 4) matrix of these alone is needed");
+    require(place.cwiseAbs().maxCoeff() <= farthest, "obstacles[" + std::to_string(i) + "].placement",
+            number_text(place.cwiseAbs().maxCoeff()) + " in it",
+            "numbers of at most " + number_text(farthest) + " are allowed");
   }
   require_not_negative("friction", contact.friction);
   require(!contact.ground || std::isfinite(*contact.ground), "ground", "NaN or infinite",
           "a finite height is needed");
+  if (contact.ground) require_range("ground", *contact.ground, -farthest, farthest);
   const double length = contact.up.stableNorm();
   require(std::isfinite(length) && length > 0.0, "up", length == 0.0 ? "zero" : "NaN or infinite",
           "a finite direction of any positive length is allowed");

@@ -80,16 +80,24 @@ Solution train_inverse(const DeformationField& field, const SurfaceSamples& samp
   loop.training = options.training;
   loop.schedule.hold_fraction = 0.3;
   loop.schedule.final_share = 0.01;
-  Solution solution{inverse, {}};
-  solution.report.loop = minimise(*inverse, objective, loop, progress);
-  Points images(rest.rows(), 3), back(rest.rows(), 3);
+  Points images(rest.rows(), 3);
   field.evaluate(rest, {images.data(), rest.rows(), JetOrder::value});
   inverse->set_rest_points(images.topRows(std::min<Index>(images.rows(), 4000)));
-  inverse->evaluate(images, {back.data(), rest.rows(), JetOrder::value});
-  const Vector error = (back - rest).rowwise().norm() * field.frame().scale;
-  solution.report.handle_mean = {error.mean()};
-  solution.report.handle_max = {error.maxCoeff()};
-  return solution;
+  const auto measured = [&](LoopResult result) {
+    Points back(rest.rows(), 3);
+    inverse->evaluate(images, {back.data(), rest.rows(), JetOrder::value});
+    const Vector error = (back - rest).rowwise().norm() * field.frame().scale;
+    Solution solution{inverse, {}};
+    solution.report.loop = std::move(result);
+    solution.report.handle_mean = {error.mean()};
+    solution.report.handle_max = {error.maxCoeff()};
+    return solution;
+  };
+  try {
+    return measured(minimise(*inverse, objective, loop, progress));
+  } catch (const LoopDiverged& cause) {
+    throw SolveDiverged(cause, measured(cause.result));
+  }
 }
 
 }  // namespace arapfields

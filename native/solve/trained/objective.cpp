@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/trained/objective.h"
 
+#include <algorithm>
 #include <cstdio>
 
+#include "core/jets.h"
 #include "tensors/operations.h"
 
 namespace arapfields {
@@ -19,6 +21,18 @@ class FieldLoop final : public LoopBody {
         random_(static_cast<std::uint64_t>(options.training.seed), 0x5eed) {}
 
   Tensor accumulate(int) override { return objective_.accumulate(field_, random_); }
+  /// At the field's rest points, with all derivatives that a report measures.
+  bool is_finite() override {
+    constexpr Index rows = 1024;
+    const Points& rest = field_.rest_points();
+    for (Index begin = 0; begin < rest.rows(); begin += rows) {
+      const Points part = rest.middleRows(begin, std::min(rows, rest.rows() - begin));
+      JetBlock<double> jets(part.rows(), JetOrder::second);
+      field_.evaluate(part, jets.view());
+      if (!Eigen::Map<const Vector>(jets.view().data, jets.view().size()).allFinite()) return false;
+    }
+    return true;
+  }
   std::vector<LossTerm> terms() const override { return objective_.terms(); }
   void iterated(int count) override {
     if (observer_) observer_(count);

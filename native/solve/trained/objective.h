@@ -30,7 +30,8 @@ inline Trainable trainable(TrainableField& field) {
   return {field.parameters(), field.gradient(), field.matrices()};
 }
 
-/// Minimises by run_training(), with random numbers of the options' seed.
+/// Minimises by run_training(), with random numbers of the options' seed. What it returns is finite at the
+/// field's rest points.
 LoopResult minimise(TrainableField& field, Objective& objective, const LoopOptions& options,
                     const Progress& progress, const LoopObserver& observer = {});
 

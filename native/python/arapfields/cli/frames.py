@@ -5,6 +5,7 @@ import contextlib
 import errno
 import hashlib
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -15,11 +16,19 @@ from .._locks import lock
 from .._native import InvalidInput
 
 TYPE = np.dtype("<f4")
+FRAME = re.compile(
+    r"\d{7,}-[0-9a-f]{24,32}(\.safetensors)?"
+)  # names of solved frames, of a wrapped one's field
+LOCK = re.compile(r"lock(-.*)?")
 
 
 def folder_beside(output):
     """The folder ".NAME.frames" for solved frames of an output."""
     return output.with_name(f".{output.name}.frames")
+
+
+def is_frame(path):
+    return FRAME.fullmatch(path.name) is not None
 
 
 class FrameStore:
@@ -129,8 +138,8 @@ class FrameStore:
             yield
 
     def remove(self, places=None):
-        """Removes these frames; with None all, also those of other settings."""
-        for place in places or ():
+        """Removes these frames; with None all, also those of other settings. Foreign files stay."""
+        for place in places if places is not None else filter(is_frame, self.folder.iterdir()):
             place.unlink(missing_ok=True)
-        if places is None or not any(not path.name.startswith("lock") for path in self.folder.iterdir()):
+        if all(LOCK.fullmatch(path.name) for path in self.folder.iterdir()):
             shutil.rmtree(self.folder, ignore_errors=True)

@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Handle tracks: the targets of handles in each frame; docs/animate.md describes the two formats."""
 
-import io
 import json
-import zipfile
 
 import numpy as np
 
-from .._files import existing_file, read_text
-from .._native import InvalidInput, require_memory
-from .files import readable
+from .._files import existing_file, read_arrays, read_text
+from .._native import InvalidInput
 from .handles import build_handles
 
 SUFFIXES = (".json", ".npz")
@@ -137,32 +134,3 @@ def _moves(where, kind, frames):
     if bad.any():
         raise InvalidInput(f"{where}: the frame at place {int(bad.argmax())} is NaN or infinite")
     return moves[:, :3, 3] if kind == "point" and not single else moves
-
-
-def read_arrays(path, names):
-    """The named arrays of a NumPy archive; their sizes are checked against the file's first."""
-    require_memory(str(path), 2.0 * path.stat().st_size)
-    content = io.BytesIO(path.read_bytes())
-    arrays = {}
-    with readable(path, "a NumPy archive"), zipfile.ZipFile(content) as archive:
-        for entry in archive.infolist():
-            name = entry.filename.removesuffix(".npy")
-            if name not in names:
-                raise InvalidInput(f"{path}: unknown array {name!r:.40}; known are {sorted(names)}")
-            require_memory(str(path), 2.0 * entry.file_size)
-            with archive.open(entry) as file:
-                arrays[name] = _array(file, entry.file_size)
-    return arrays
-
-
-def _array(file, size):
-    version = np.lib.format.read_magic(file)
-    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, fortran, kind = read(file)
-    count = 1
-    for length in shape:
-        count *= length
-    if kind.hasobject or any(length < 0 for length in shape) or file.tell() + count * kind.itemsize != size:
-        raise ValueError("an array's header does not fit its content")
-    array = np.frombuffer(file.read(), kind)
-    return array.reshape(shape[::-1]).T if fortran else array.reshape(shape)

@@ -3,11 +3,9 @@
 
 from pathlib import Path
 
-import numpy as np
-
 import arapfields as af
 
-from .._files import existing_file, json_text, write_arrays
+from .._files import existing_file, json_text, read_arrays, write_arrays
 from . import files, verbs
 from .flags import MESH
 from .running import Outputs, with_progress
@@ -132,6 +130,4 @@ def shape_of(path, giving):
 
 
 def read_values(path):
-    path = existing_file(path, (".npz",))
-    with files.readable(path, "arrays"), np.load(path, allow_pickle=False) as archive:
-        return {name: archive[name] for name in archive.files}
+    return read_arrays(existing_file(path, (".npz",)))

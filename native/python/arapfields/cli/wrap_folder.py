@@ -84,7 +84,7 @@ def write_sheet(output, everything, suffix):
             figures = f"{off(report):.2%} of the target's size off; {'; '.join(report['notes'])}"
             wrapped = files.read_mesh(place)
             rows.append((off(report), contact_sheet.cell(path.name, figures.rstrip("; "), wrapped, target)))
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             continue  # not finished, or of another program
     rows.sort(key=lambda row: -row[0])
     page, place = contact_sheet.page([row for _, row in rows]), output / "sheet.html"
@@ -103,7 +103,7 @@ def read_done(place, mark):
     """The report of an output if it was made with the same input and settings; else None."""
     try:
         found = json.loads(place.with_suffix(".json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
     made = place.is_file() and isinstance(found, dict) and found.get("made_with") == mark.hexdigest()
     return found if made else None

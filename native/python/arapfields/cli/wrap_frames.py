@@ -2,14 +2,14 @@
 """Wraps onto the frames of a scanned motion, stored so that an interrupted run can be continued."""
 
 import hashlib
-import zipfile
 
 import numpy as np
 
 import arapfields as af
 
-from .._files import whole_file, write_arrays
+from .._files import read_arrays, whole_file, write_arrays
 from .._report_files import from_json, to_json
+from .frames import is_frame
 from .options import result_options
 
 
@@ -87,20 +87,20 @@ class WrappedFrames:
     def _kept(self, place):
         """(field, report) from a file; None if it is missing or damaged."""
         try:
-            with np.load(place, allow_pickle=False) as kept:
-                state, report = kept["state"], from_json(str(kept["report"]))
+            kept = read_arrays(place)
+            state, report = kept["state"], from_json(str(kept["report"]))
             if self._first is None:
                 return af.DeformationField.load(field_of(place)), report
             self._behind_first().state = state
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return None
         return self._sequence.field, report
 
     def forget_others(self):
         """Removes stored files of other frames and settings."""
         kept = {*self._places, *map(field_of, self._places[:1])}
-        for path in self.folder.glob("[0-9]*"):
-            if path not in kept:
+        for path in self.folder.iterdir():
+            if is_frame(path) and path not in kept:
                 path.unlink(missing_ok=True)
 
 
