@@ -70,14 +70,14 @@ std::vector<Handle> moved_handles(const RadialSolver& live, const Targets& targe
 }
 
 LiveReportResult as_python(const RadialReport& r) {
-  return make_report("LiveReport", "energy"_a = r.arap.energy, "value"_a = r.value,
-                     "handle_error_mean"_a = r.handle_mean, "handle_error_max"_a = r.handle_max,
-                     "max_stretch"_a = r.distortion.max_stretch, "min_stretch"_a = r.distortion.min_stretch,
-                     "iterations"_a = r.iterations, "evaluations"_a = r.evaluations,
-                     "converged"_a = r.converged, "seconds"_a = r.seconds,
-                     "setup_seconds"_a = r.setup_seconds, "notes"_a = py::tuple(py::cast(r.warnings)),
-                     "preference"_a = r.preference, "contact"_a = contact_report(r.contact),
-                     "kinetic"_a = r.kinetic, "speed"_a = r.speed, **field_measures(r.arap, r.distortion));
+  return make_report(
+      "LiveReport", "energy"_a = r.arap.energy, "value"_a = r.value, "handle_error_mean"_a = r.handle_mean,
+      "handle_error_max"_a = r.handle_max, "max_stretch"_a = r.distortion.max_stretch,
+      "min_stretch"_a = r.distortion.min_stretch, "iterations"_a = r.iterations,
+      "evaluations"_a = r.evaluations, "converged"_a = r.converged, "seconds"_a = r.seconds,
+      "setup_seconds"_a = r.setup_seconds, "notes"_a = py::tuple(py::cast(r.warnings)),
+      "preference"_a = r.preference, "contact"_a = contact_report(r.contact), "terms"_a = terms_of(r.terms),
+      "kinetic"_a = r.kinetic, "speed"_a = r.speed, **field_measures(r.arap, r.distortion));
 }
 
 /// The field and report that call(solver, progress) leaves.

@@ -38,7 +38,7 @@ py::object solve_report(const SolveReport& report, double scale) {
                      "scale"_a = scale, "loss"_a = py::tuple(loss),
                      "notes"_a = py::tuple(py::cast(report.warnings)), "preference"_a = report.preference,
                      "far_target"_a = report.far_target, "contact"_a = contact_report(report.contact),
-                     **field_measures(report.arap, report.distortion));
+                     "terms"_a = terms_of(report.terms), **field_measures(report.arap, report.distortion));
 }
 
 py::object solved(const Solution& solution) {

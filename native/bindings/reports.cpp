@@ -13,6 +13,12 @@ py::dict field_measures(const ArapValue& arap, const Distortion& distortion) {
                   "flipped_share"_a = distortion.flipped_share);
 }
 
+py::dict terms_of(const std::vector<LossTerm>& terms) {
+  py::dict result;
+  for (const LossTerm& term : terms) result[py::str(term.name)] = term.value;
+  return result;
+}
+
 py::object contact_report(const ContactReport& contact) {
   py::list held;
   for (const HeldBack& h : contact.held)
@@ -56,11 +62,9 @@ IterationObserver as_observer(const py::object& callback) {
   const std::shared_ptr<py::object> held = kept_alive(callback);
   return [held](const Iteration& iteration) {
     const py::gil_scoped_acquire acquire;
-    py::dict terms;
-    for (const LossTerm& term : iteration.terms) terms[py::str(term.name)] = term.value;
     try {
       (*held)(make_report("Iteration", "iteration"_a = iteration.number, "loss"_a = iteration.loss,
-                          "terms"_a = terms, "seconds"_a = iteration.seconds));
+                          "terms"_a = terms_of(iteration.terms), "seconds"_a = iteration.seconds));
     } catch (const py::error_already_set& raised) {
       if (!raised.matches(PyExc_StopIteration)) throw;
       return false;

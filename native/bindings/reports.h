@@ -19,6 +19,8 @@ py::object make_report(const char* kind, Fields&&... fields) {
 }
 /// The fields that all reports on a field share, for `**` in make_report.
 py::dict field_measures(const ArapValue& arap, const Distortion& distortion);
+/// {name: weighted value} of terms.
+py::dict terms_of(const std::vector<LossTerm>& terms);
 /// How a surface touches, as an arapfields.reports.ContactReport.
 py::object contact_report(const ContactReport& contact);
 /// What a report's `stopped_by` says.

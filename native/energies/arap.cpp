@@ -4,9 +4,12 @@
 #include <vector>
 
 #include "core/errors.h"
+#include "energies/composed_energies.h"
 #include "energies/kernels.h"
 #include "energies/ranges.h"
 #include "energies/rotation.h"
+#include "energies/term.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 
@@ -52,6 +55,65 @@ Mat3 closest_rotation(const Mat3& jacobian) {
   Mat3 result;  // one point's block is its columns one after another, as Eigen stores them
   ARAPFIELDS_DISPATCH(rotation_range(jacobian.data(), 1, 0, 1, result.data()));
   return result;
+}
+
+namespace {
+
+class ArapTerm final : public JetTerm {
+ public:
+  ArapTerm(double weight, bool bends) : weight_(weight), bends_(bends) {}
+  std::string name() const override { return "arap"; }
+  JetOrder order() const override { return bends_ ? JetOrder::second : JetOrder::first; }
+  void set_batch(const TermBatch& batch) override {
+    weights_ = VectorInBoth(batch.weights);
+    bending_ = VectorInBoth(batch.bending);
+    lists_bend_ = bends_ && (batch.bending.array() > 0.0).any();
+  }
+  double evaluate(const JetView<const float>& jets, const JetView<float>& cotangents,
+                  std::vector<LossTerm>* parts) const override {
+    return value(jets, cotangents, parts);
+  }
+  double evaluate(const JetView<const double>& jets, const JetView<double>& cotangents,
+                  std::vector<LossTerm>* parts) const override {
+    return value(jets, cotangents, parts);
+  }
+  Tensor compose(const Tensor& jets, const EnergyTables& tables, Tensor cotangents,
+                 std::vector<ComposedPart>& parts) const override {
+    const Vector& weights = weights_.in<double>();
+    const ComposedFactors factors{weights.size() > 0 ? tensor_like(weights, jets) : Tensor(),
+                                  tensor_like(bending_.in<double>(), jets)};
+    const Tensor means = composed_arap(jets, bends_ ? 1.0 : 0.0, weight_, tables, cotangents, factors);
+    parts.push_back({"stretch", weight_ * means[3]});
+    if (lists_bend_) parts.push_back({"bend", weight_ * (means[2] - means[3])});
+    return weight_ * means[2];
+  }
+
+ private:
+  template <class Scalar>
+  double value(const JetView<const Scalar>& jets, const JetView<Scalar>& cotangents,
+               std::vector<LossTerm>* parts) const {
+    const auto& weights = weights_.in<Scalar>();
+    const ArapValue means =
+        arap_energy<Scalar>(jets, bends_ ? 1.0 : 0.0, weight_, cotangents,
+                            {weights.size() > 0 ? weights.data() : nullptr, bending_.in<Scalar>().data()});
+    if (parts != nullptr) {
+      parts->push_back({"stretch", weight_ * means.stretch_energy});
+      if (lists_bend_) parts->push_back({"bend", weight_ * (means.energy - means.stretch_energy)});
+    }
+    return weight_ * means.energy;
+  }
+
+  double weight_;
+  bool bends_;
+  bool lists_bend_ = false;  // whether any sample resists bending
+  VectorInBoth weights_;     // may be empty
+  VectorInBoth bending_;
+};
+
+}  // namespace
+
+std::shared_ptr<JetTerm> arap_term(double weight, bool bends) {
+  return std::make_shared<ArapTerm>(weight, bends);
 }
 
 template ArapValue arap_energy<float>(JetView<const float>, double, double, JetView<float>,

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
+
 #include "core/jets.h"
 
 namespace arapfields {
+
+class JetTerm;
 
 /// Means over the points of how far J is from a rotation and of how fast that rotation turns.
 struct ArapValue {
@@ -29,5 +33,9 @@ struct ArapFactors {
 template <class Scalar>
 ARAPFIELDS_EXPORT ArapValue arap_energy(JetView<const Scalar> jets, double bending, double weight,
                                         JetView<Scalar> cotangents, ArapFactors<Scalar> factors = {});
+
+/// weight · mean w (stretch + λ·bend) of a batch, with parts "stretch" and "bend"; first order if it does not
+/// `bend`.
+std::shared_ptr<JetTerm> arap_term(double weight, bool bends);
 
 }  // namespace arapfields

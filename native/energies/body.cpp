@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/errors.h"
+#include "energies/term.h"
 
 namespace arapfields {
 
@@ -33,6 +34,34 @@ BodyEnergy body_energy(JetView<const Scalar> jets, const Body<Scalar>& body, Jet
   }
   return energy;
 }
+
+namespace {
+
+class BodyTerm final : public JetTermOf<BodyTerm> {
+ public:
+  explicit BodyTerm(const Body<double>& body)
+      : exact_(body),
+        single_{body.masses.cast<float>(), body.rest.cast<float>(), body.goal.cast<float>(), body.inertia,
+                body.gravity} {}
+  std::string name() const override { return "motion"; }
+  JetOrder order() const override { return JetOrder::value; }
+  void set_batch(const TermBatch&) override {}
+  template <class Scalar>
+  double value(const JetView<const Scalar>& jets, const JetView<Scalar>& cotangents) const {
+    if constexpr (std::is_same_v<Scalar, float>)
+      return body_energy<float>(jets, single_, cotangents).sum();
+    else
+      return body_energy<double>(jets, exact_, cotangents).sum();
+  }
+
+ private:
+  Body<double> exact_;
+  Body<float> single_;
+};
+
+}  // namespace
+
+std::shared_ptr<JetTerm> body_term(const Body<double>& body) { return std::make_shared<BodyTerm>(body); }
 
 #define ARAPFIELDS_BODY(Scalar) \
   template BodyEnergy body_energy<Scalar>(JetView<const Scalar>, const Body<Scalar>&, JetView<Scalar>);

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
+
 #include "core/jets.h"
 
 namespace arapfields {
+
+class JetTerm;
 
 /// External forces on a body of mass m, at samples (n): the inertia of an implicit time step, and gravity.
 template <class Scalar>
@@ -25,5 +29,8 @@ struct BodyEnergy {
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS BodyEnergy body_energy(JetView<const Scalar> jets, const Body<Scalar>& body,
                                                   JetView<Scalar> cotangents);
+
+/// The sum of body_energy(), of a body at the samples of all batches.
+std::shared_ptr<JetTerm> body_term(const Body<double>& body);
 
 }  // namespace arapfields

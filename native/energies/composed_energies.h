@@ -5,6 +5,8 @@
 // arap.h, gauss.h, distortion.h, handles.h and stance.h, as tensors.
 #pragma once
 
+#include <string>
+
 #include "tensors/tensor.h"
 
 namespace arapfields {
@@ -31,6 +33,12 @@ struct EnergyTables {
   Tensor last;         ///< (3): and of k + 2
   Tensor next_axis;    ///< (3): k + 1 (mod 3)
   Tensor last_axis;    ///< (3): k + 2
+};
+
+/// A weighted part of a term (energies/term.h), on the device where it was computed.
+struct ComposedPart {
+  std::string name;
+  Tensor value;
 };
 
 /// Closest rotations (n,3,3) of Jacobians (n,3,3), and K of each by eigenvectors (columns of axes) and

@@ -6,11 +6,37 @@
 
 #include "core/errors.h"
 #include "core/jacobians.h"
+#include "energies/composed_energies.h"
 #include "energies/kernels.h"
 #include "energies/ranges.h"
+#include "energies/term.h"
+#include "tensors/views.h"
 
 namespace arapfields {
-namespace {}  // namespace
+namespace {
+
+class BarrierTerm final : public JetTermOf<BarrierTerm> {
+ public:
+  BarrierTerm(double threshold, double weight) : threshold_(threshold), weight_(weight) {}
+  std::string name() const override { return "barrier"; }
+  JetOrder order() const override { return JetOrder::first; }
+  void set_batch(const TermBatch&) override {}
+  template <class Scalar>
+  double value(const JetView<const Scalar>& jets, const JetView<Scalar>& cotangents) const {
+    return weight_ * fold_barrier<Scalar>(jets, threshold_, weight_, cotangents);
+  }
+  Tensor compose(const Tensor& jets, const EnergyTables& tables, Tensor cotangents,
+                 std::vector<ComposedPart>& parts) const override {
+    parts.push_back({name(), weight_ * composed_barrier(jets, threshold_, weight_, tables, cotangents)});
+    return parts.back().value;
+  }
+
+ private:
+  double threshold_;
+  double weight_;
+};
+
+}  // namespace
 
 template <class Scalar>
 Distortion distortion(JetView<const Scalar> jets) {
@@ -59,6 +85,10 @@ double fold_barrier(JetView<const Scalar> jets, double threshold, double weight,
     }
   });
   return sums[0] / n;
+}
+
+std::shared_ptr<JetTerm> barrier_term(double threshold, double weight) {
+  return std::make_shared<BarrierTerm>(threshold, weight);
 }
 
 template Distortion distortion<float>(JetView<const float>);

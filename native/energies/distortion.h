@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
+
 #include "core/jets.h"
 
 namespace arapfields {
+
+class JetTerm;
 
 /// Determinants and stretches of a deformation over the points of its jets: how far it is from folding.
 struct Distortion {
@@ -22,5 +26,8 @@ ARAPFIELDS_EXPORT Distortion distortion(JetView<const Scalar> jets);
 template <class Scalar>
 ARAPFIELDS_EXPORT double fold_barrier(JetView<const Scalar> jets, double threshold, double weight,
                                       JetView<Scalar> cotangents);
+
+/// weight · fold_barrier() of a batch.
+std::shared_ptr<JetTerm> barrier_term(double threshold, double weight);
 
 }  // namespace arapfields

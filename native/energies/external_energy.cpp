@@ -2,17 +2,14 @@
 #include "energies/external_energy.h"
 
 #include <cmath>
+#include <numeric>
 #include <string>
+
+#include "energies/term.h"
 
 namespace arapfields {
 
 ExternalEnergy::~ExternalEnergy() = default;
-
-JetOrder highest_order(const ExternalEnergies& energies, JetOrder own) {
-  for (const auto& energy : energies)
-    if (columns(energy->order()) > columns(own)) own = energy->order();
-  return own;
-}
 
 template <class Scalar>
 std::vector<double> external_energies(const ExternalEnergies& energies, PointsIn points,
@@ -39,6 +36,46 @@ std::vector<double> external_energies(const ExternalEnergies& energies, PointsIn
     values.push_back(weight * value);
   }
   return values;
+}
+
+namespace {
+
+class ExternalTerm final : public JetTerm {
+ public:
+  ExternalTerm(ExternalEnergies energies, double weight) : energies_(std::move(energies)), weight_(weight) {}
+  std::string name() const override { return "energies"; }
+  JetOrder order() const override {
+    JetOrder highest = JetOrder::first;
+    for (const auto& energy : energies_)
+      if (columns(energy->order()) > columns(highest)) highest = energy->order();
+    return highest;
+  }
+  void set_batch(const TermBatch& batch) override { points_ = batch.points; }
+  double evaluate(const JetView<const float>& jets, const JetView<float>& cotangents,
+                  std::vector<LossTerm>* parts) const override {
+    return sum_of(external_energies<float>(energies_, points_, jets, weight_, cotangents), parts);
+  }
+  double evaluate(const JetView<const double>& jets, const JetView<double>& cotangents,
+                  std::vector<LossTerm>* parts) const override {
+    return sum_of(external_energies<double>(energies_, points_, jets, weight_, cotangents), parts);
+  }
+
+ private:
+  static double sum_of(const std::vector<double>& values, std::vector<LossTerm>* parts) {
+    for (std::size_t i = 0; parts != nullptr && i < values.size(); ++i)
+      parts->push_back({"energies[" + std::to_string(i) + "]", values[i]});
+    return std::accumulate(values.begin(), values.end(), 0.0);
+  }
+
+  ExternalEnergies energies_;
+  double weight_;
+  Points points_;
+};
+
+}  // namespace
+
+std::shared_ptr<JetTerm> external_term(ExternalEnergies energies, double weight) {
+  return std::make_shared<ExternalTerm>(std::move(energies), weight);
 }
 
 template std::vector<double> external_energies(const ExternalEnergies&, PointsIn, const JetView<const float>&,

@@ -10,6 +10,8 @@
 
 namespace arapfields {
 
+class JetTerm;
+
 /// A user-defined term of the loss of deform or stylize.
 class ARAPFIELDS_EXPORT ExternalEnergy {
  public:
@@ -25,9 +27,6 @@ class ARAPFIELDS_EXPORT ExternalEnergy {
 
 using ExternalEnergies = std::vector<std::shared_ptr<ExternalEnergy>>;
 
-/// The highest order among the energies and `own`.
-JetOrder highest_order(const ExternalEnergies& energies, JetOrder own);
-
 /// The energies' values times `weight`, one after the other; adds their derivatives times it to cotangents of
 /// the same order as the jets (null data: values alone). Throws InvalidInput that names the energy
 /// for a value that is NaN, and for derivatives that are not finite where the value is.
@@ -35,5 +34,8 @@ template <class Scalar>
 std::vector<double> external_energies(const ExternalEnergies& energies, PointsIn points,
                                       const JetView<const Scalar>& jets, double weight,
                                       const JetView<Scalar>& cotangents);
+
+/// Energies times `weight` as one term, with a part "energies[i]" of each.
+std::shared_ptr<JetTerm> external_term(ExternalEnergies energies, double weight);
 
 }  // namespace arapfields

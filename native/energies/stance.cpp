@@ -7,6 +7,9 @@
 
 #include "core/decompositions.h"
 #include "core/errors.h"
+#include "energies/composed_energies.h"
+#include "energies/term.h"
+#include "tensors/views.h"
 
 namespace arapfields {
 namespace {
@@ -89,6 +92,49 @@ double stance_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest, co
          (displacements + stance.ground.cwiseProduct(rises) * stance.up.transpose() + arms * lean.slope))
             .template cast<Scalar>();
   return share * (displacements.squaredNorm() + stance.ground.dot(rises.cwiseAbs2()) + lean.energy);
+}
+
+namespace {
+
+class StanceTerm final : public JetTermOf<StanceTerm> {
+ public:
+  StanceTerm(Stance stance, double weight) : stance_(std::move(stance)), weight_(weight) {}
+  std::string name() const override { return "stance"; }
+  JetOrder order() const override { return JetOrder::value; }
+  void set_batch(const TermBatch& batch) override {
+    rest_ = PointsInBoth(batch.points);
+    batch_ = stance_;
+    if (batch.rows.empty()) return;
+    batch_.ground.setZero(batch.points.rows());
+    for (Index i = 0; i < batch.points.rows(); ++i)
+      if (const Index row = batch.rows[static_cast<std::size_t>(i)]; row >= 0)
+        batch_.ground[i] = stance_.ground[row];
+  }
+  template <class Scalar>
+  double value(const JetView<const Scalar>& jets, const JetView<Scalar>& cotangents) const {
+    return weight_ * stance_energy<Scalar>(jets, rest_.in<Scalar>(), batch_, weight_, cotangents);
+  }
+  Tensor compose(const Tensor& jets, const EnergyTables& tables, Tensor cotangents,
+                 std::vector<ComposedPart>& parts) const override {
+    const double weight = weight_ * batch_.scale;
+    parts.push_back(
+        {name(), weight * composed_stance(jets, tensor_like(rest_.in<double>(), jets),
+                                          tensor_like(Vector(batch_.up), jets),
+                                          tensor_like(batch_.ground, jets), weight, tables, cotangents)});
+    return parts.back().value;
+  }
+
+ private:
+  Stance stance_;  // of all samples
+  Stance batch_;
+  PointsInBoth rest_;
+  double weight_;
+};
+
+}  // namespace
+
+std::shared_ptr<JetTerm> stance_term(Stance stance, double weight) {
+  return std::make_shared<StanceTerm>(std::move(stance), weight);
 }
 
 #define ARAPFIELDS_STANCE(Scalar)                                                                     \

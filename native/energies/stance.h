@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
+
 #include "core/jets.h"
 
 namespace arapfields {
+
+class JetTerm;
 
 /// A figure's stance: its upward direction, and the samples on the ground.
 struct ARAPFIELDS_EXPORT_TO_TESTS Stance {
@@ -29,5 +33,8 @@ template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double stance_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest,
                                                 const Stance& stance, double weight,
                                                 JetView<Scalar> cotangents);
+
+/// weight · stance_energy() of a batch of the samples; fresh ones are not on the ground.
+std::shared_ptr<JetTerm> stance_term(Stance stance, double weight);
 
 }  // namespace arapfields

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "energies/gauss.h"
 #include "energies/object_style.h"
 
 namespace arapfields {
+
+class JetTerm;
 
 /// A style: preferred normals (k,3), or the map of directions T of an object.
 struct Style {
@@ -41,6 +44,10 @@ double style_energy(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
   if (preference) return gauss_energy<Scalar>(jets, normals, sample_weights, *preference, weight, cotangents);
   return target_energy<Scalar>(jets, normals, targets, sample_weights, weight, cotangents);
 }
+
+/// weight · style_energy() of a batch of the samples. Its own weights count, or 1 where there are none; fresh
+/// samples have weight 1, or 0 for an object's style.
+std::shared_ptr<JetTerm> style_term(StyleAtSamples style, double weight);
 
 /// The preference in reports, mean g or mean ñ·t, from style_energy() with weights 1.
 inline double preference_of(const std::optional<GaussPreference>& preference, double style_energy) {

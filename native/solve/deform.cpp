@@ -95,6 +95,7 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
   const ThreadScope threads(options.machine.threads);
   ObjectiveTerms terms = terms_of(samples, handles, options);
   terms.external = hooks.energies;
+  terms.further = hooks.terms;
 
   const std::shared_ptr<TrainableField> field = trained_field(options);
   auto* const neural = dynamic_cast<NeuralField*>(field.get());  // other kinds have neither blend nor base

@@ -126,6 +126,7 @@ Solution solve_field(std::shared_ptr<TrainableField> field, const SurfaceSamples
         minimise(*field, wrapped ? *wrapped : objective, options, progress.part(0.0, 0.95), shown);
     progress.report(0.95, "measuring the result");
     Solution solution = measured(field, samples, objective.objective_terms(), std::move(loop));
+    solution.report.terms = (wrapped ? *wrapped : objective).terms();
     progress.report(1.0, "done");
     return solution;
   } catch (const LoopDiverged& cause) {

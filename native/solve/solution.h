@@ -19,6 +19,7 @@ namespace arapfields {
 /// The stretch and the energy are pure numbers, the bend is in 1/cube units², lengths are in mesh units.
 struct SolveReport {
   ArapValue arap;                   ///< arap.energy with the samples' own stiffness
+  std::vector<LossTerm> terms;      ///< the weighted terms of the last iteration, at its samples
   std::vector<double> handle_mean;  ///< distance ‖f(x) − C x‖, of each handle
   std::vector<double> handle_max;
   std::optional<double> far_target;  ///< FarTarget::sizes (solve/warnings.h); none: no target is far

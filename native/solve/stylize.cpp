@@ -62,6 +62,7 @@ Solution stylize(const SurfaceSamples& samples, const Style& style, const Styliz
     terms.gauss = options.strength * options.gauss_weight * terms.style.factor;
   if (weights.size() > 0) terms.style.weights = terms.style.weights.cwiseProduct(weights);
   terms.external = hooks.energies;
+  terms.further = hooks.terms;
   const Handle lowest = lowest_point(samples, up);
   terms.handles = handles.empty() ? BoundHandles({lowest}, samples.points)
                                   : BoundHandles(in_cube(handles, samples.frame), samples.points);
@@ -76,10 +77,10 @@ Solution stylize(const SurfaceSamples& samples, const Style& style, const Styliz
   const std::shared_ptr<TrainableField> field = trained_field(options);
   LoopOptions loop = training_of(options);
   loop.observer = hooks.observer;
-  if (terms.gauss == 0.0 && handles.empty() && hooks.energies.empty()) loop.training.iterations = 0;
+  if (terms.gauss == 0.0 && handles.empty() && !hooks.adds_terms()) loop.training.iterations = 0;
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress);
   if (handles.empty()) {
-    if (hooks.energies.empty()) anchor_lowest_point(*field, lowest);
+    if (!hooks.adds_terms()) anchor_lowest_point(*field, lowest);
     solution.report.handle_mean.clear();
     solution.report.handle_max.clear();
   }

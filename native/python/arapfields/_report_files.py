@@ -68,6 +68,8 @@ def _typed(value: Any, declared: Any) -> Any:
         if inner[-1] is Ellipsis:
             return tuple(_typed(item, inner[0]) for item in value)
         return tuple(_typed(item, one) for item, one in zip(value, inner, strict=True))
+    if origin is dict and isinstance(value, dict):
+        return {_typed(name, inner[0]): _typed(item, inner[1]) for name, item in value.items()}
     if origin is Literal and value in inner:
         return value
     if origin in (Union, UnionType):

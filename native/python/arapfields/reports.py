@@ -4,7 +4,7 @@
 Energies are the unit cube's, lengths the mesh's. `report["bend"]` reads report.bend; to_dict() is for JSON.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Generic, Literal, NamedTuple, Self, TypeAlias, TypeVar
 
 import numpy as np
@@ -77,6 +77,8 @@ class EnergyReport(Report):
     """Mean agreement with the preferred normals, if there are any."""
     notes: tuple[str, ...] = ()
     """Warnings: folds, distant targets, margins that were reduced."""
+    terms: dict[str, float] = field(default_factory=dict, hash=False)
+    """The weighted terms of the minimised sum at the end; a network's are of its last batch of samples."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,18 +23,7 @@ VectorF measured(RadialState& s, const DeformationField& field) {
     if (order == JetOrder::second) jets.bottomRows(6 * points.rows()) *= own.scale / from.scale;
     return jets;
   };
-  const Points& places = s.problem.energy_points;
-  const PartLinks& links = s.handles.links();
-  RowMatrix<double> jets = jets_at(places, JetOrder::second);
-  if (s.problem.blend)
-    RadialBlend<double>(*s.problem.blend, places).multiply({jets.data(), places.rows(), JetOrder::second});
-  const RowMatrix<double> ends = jets_at(s.handles.pairs().sources, JetOrder::value);
-  const RowMatrix<double> apart =
-      links.values(jets_at(links.from(), JetOrder::first), jets_at(links.to(), JetOrder::first));
-  RowMatrix<float> u(jets.rows() + ends.rows() + apart.rows() + s.problem.basis.center_count(), 3);
-  u << jets.cast<float>(), ends.cast<float>(), apart.cast<float>(),
-      RowMatrix<float>::Zero(s.problem.basis.center_count(), 3);
-  return u.reshaped<Eigen::RowMajor>();
+  return s.fast.objective.latest()->measured(jets_at);
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ void report_contact(RadialState& s, const std::vector<Index>& held_by) {
 double value_without_contact(RadialState& s) {
   const RadialObjective<float>& objective = s.objective(s.fast);
   const VectorF& u = s.measurements(s.fast);
-  return objective.value(u, nullptr) - objective.terms(u).contact;
+  return objective.value(u, nullptr) - objective.contact_value(u);
 }
 
 /// The state that a trial solve changes, to restore it if the trial is rejected.

@@ -59,15 +59,12 @@ double SurfaceDynamics::kinetic_energy(PointsIn velocities_at_samples) {
          static_cast<double>(velocities_at_samples.rows());
 }
 
-template <class Scalar>
-std::optional<Body<Scalar>> SurfaceDynamics::inertia_terms(double inertia, PointsOf<Scalar> goal) {
+std::optional<Body<double>> SurfaceDynamics::body(double inertia, Points goal) {
   if (!has_mass()) return std::nullopt;
-  Body<Scalar> body{masses().cast<Scalar>(), problem_.energy_points.cast<Scalar>(), std::move(goal), inertia};
+  Body<double> body{masses(), problem_.energy_points, std::move(goal), inertia};
   body.gravity = -mass() * motion_->options.gravity / problem_.frame().scale * motion_->up;
   return body;
 }
-template std::optional<Body<float>> SurfaceDynamics::inertia_terms<float>(double, PointsF);
-template std::optional<Body<double>> SurfaceDynamics::inertia_terms<double>(double, Points);
 
 /// Applies the filter 1 − (1 − S)² with S = (G + τK)⁻¹ G; G is the Gram matrix of the values at the energy
 /// samples, K the stiffness matrix. It also removes components that vanish at all samples.

@@ -28,10 +28,9 @@ class SurfaceDynamics {
   const Vector& masses();
   /// ½ mass · mean m ‖v‖² for velocities v (n,3) of the energy samples.
   double kinetic_energy(PointsIn velocities);
-  /// The objective's terms of a body (energies/body.h) with this inertia, whose energy samples would move to
-  /// `goal` (n,3) without forces; none without a mass.
-  template <class Scalar>
-  std::optional<Body<Scalar>> inertia_terms(double inertia = 0.0, PointsOf<Scalar> goal = {});
+  /// The body (energies/body.h) with this inertia, whose energy samples would move to `goal` (n,3) without
+  /// forces; none without a mass.
+  std::optional<Body<double>> body(double inertia = 0.0, Points goal = Points(0, 3));
   /// Low-pass filter of velocities or accelerations (coefficients), for time steps of length h.
   RowMatrix<double> smooth(const RowMatrix<double>& x, const StiffnessTerms& stiffness, double h);
   /// Sets zero velocity and unknown acceleration, with the handles at these motions.

@@ -146,7 +146,7 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
   Iteration iteration;
   bool ended = false;
   Convergence convergence(bounds.least_gain, hooks.contact.has_value());
-  RadialHooks steps{hooks.energies, 1.0 / rigidity, {}};
+  RadialHooks steps{hooks.energies, 1.0 / rigidity, {}, hooks.terms};
   if (hooks.observer)
     steps.observer = [&](const std::vector<LossTerm>& terms) {
       ++iteration.number;
@@ -181,11 +181,13 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
 }
 
 Solution finish(const Shown& shown, const SurfaceSamples& samples, const ObjectiveTerms& terms,
-                LoopResult loop, const ContactReport& contact, const Progress& progress) {
+                LoopResult loop, const RadialReport& solved, const Progress& progress) {
   progress.report(0.98, "measuring the result");
   Solution solution = measured(shown(), samples, terms, std::move(loop));
-  solution.report.contact = contact;
-  for (std::string& note : notes_on(contact)) solution.report.warnings.push_back(std::move(note));
+  solution.report.contact = solved.contact;
+  solution.report.terms = solved.terms;
+  for (LossTerm& term : solution.report.terms) term.value *= terms.rigidity;
+  for (std::string& note : notes_on(solved.contact)) solution.report.warnings.push_back(std::move(note));
   return solution;
 }
 
@@ -236,7 +238,7 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.weights = energy_weights(samples, terms.handles);
-  return finish(shown, samples, terms, std::move(loop), solver.report().contact, progress);
+  return finish(shown, samples, terms, std::move(loop), solver.report(), progress);
 }
 
 DeformOptions followed_closely(DeformOptions options) {
@@ -289,7 +291,7 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   const Shown shown = [&] { return solver.field(); };
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity,
                               shown, {.worst = quick.report().value, .least_gain = least_style_gain});
-  solver.set_hooks({hooks.energies, 1.0 / options.rigidity, {}});
+  solver.set_hooks({hooks.energies, 1.0 / options.rigidity, {}, hooks.terms});
   const bool ended = loop.stopped_by == StopReason::observer || loop.stopped_by == StopReason::time_budget;
   for (int round = 0; round < unfolding_rounds && options.surface.barrier > 0.0 && !ended; ++round) {
     if (solver.add_fold_samples(unfolding * live.surface.barrier) == 0) break;
@@ -301,7 +303,7 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   terms.style = StyleAtSamples::of(style, samples.normals, options.sharpness);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.weights = energy_weights(samples, terms.handles);
-  return finish(shown, samples, terms, loop, solver.report().contact, progress);
+  return finish(shown, samples, terms, loop, solver.report(), progress);
 }
 
 }  // namespace arapfields

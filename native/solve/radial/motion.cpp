@@ -126,8 +126,8 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
   if (drag_ > 0.0)
     known += drag_ * (v + w * h_ * (1.0 - gamma) * a -
                       carried_.of(q + w * h_ * v, state_.problem.basis.center_count()));
-  objective.set_body(
-      body_.inertia_terms<float>(inertia, objective.sample_values_of(ahead - unit / inert * known)));
+  const PointsF goal = objective.sample_values_of(ahead - unit / inert * known);
+  objective.set_terms(state_.jet_terms(body_.body(inertia, goal.cast<double>())));
   stiffen_contact(state_);
   // Solve, starting from the prediction with the last acceleration.
   coefficients = ahead + unit * a;

@@ -1,22 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/radial/objective.h"
 
-#include <numeric>
-
-#include "core/errors.h"
-#include "energies/distortion.h"
-
 namespace arapfields {
-namespace {
-
-/// Weight of the ridge on the centers' coefficients: removes components that vanish at all samples.
-constexpr double coefficient_weight = 1e-10;
-
-}  // namespace
 
 template <class Scalar>
 RadialObjective<Scalar>::RadialObjective(const RadialProblem& problem)
-    : problem_(problem), samples_(problem.basis, problem.energy_points) {
+    : problem_(problem), samples_(problem.basis, problem.energy_points), ridge_(samples_.center_count()) {
   if (problem.blend) blend_ = RadialBlend<Scalar>(*problem.blend, problem.energy_points);
 }
 
@@ -29,26 +18,22 @@ void RadialObjective<Scalar>::set_stiffness(const Vector& bending, const Vector&
 template <class Scalar>
 void RadialObjective<Scalar>::set_handles(const HandleBatch<double>& pairs,
                                           const RowMatrix<double>& basis_values, const PartLinks& links) {
-  pairs_ = {pairs.sources.cast<Scalar>(), pairs.targets.cast<Scalar>(), pairs.weights.cast<Scalar>()};
-  handle_basis_ = TallMatrix<Scalar>(basis_values);
-  links_ = TallMatrix<Scalar>(links.rows());
-}
-
-template <class Scalar>
-void RadialObjective<Scalar>::set_targets(PointsIn targets) {
-  require(targets.rows() == pairs_.sources.rows(), "targets", std::to_string(targets.rows()) + " rows",
-          std::to_string(pairs_.sources.rows()) + " are needed");
-  pairs_.targets = targets.cast<Scalar>();
+  handles_ = HandleTerm<Scalar>(pairs, basis_values, problem_.options.handle_weight);
+  links_ = LinkTerm<Scalar>(links);
 }
 
 template <class Scalar>
 void RadialObjective<Scalar>::set_contact(const ContactSet& contact) {
-  planes_ = &contact;
+  contact_ = ContactTerm<Scalar>(problem_.basis, contact);
   contact_stiffness_ = {};
-  contact_ = contact.planes.empty()
-                 ? RadialEvaluator<Scalar>()
-                 : RadialEvaluator<Scalar>(problem_.basis, contact.places, JetOrder::value,
-                                           contact.embedded.rows() > 0 ? &contact.embedded : nullptr);
+}
+
+template <class Scalar>
+Index RadialObjective<Scalar>::offset_of(std::size_t place) const {
+  Index offset = 30 * samples_.size();
+  const auto terms = point_terms();
+  for (std::size_t i = 0; i < place; ++i) offset += 3 * terms[i]->rows();
+  return offset;
 }
 
 template <class Scalar>
@@ -61,91 +46,92 @@ PointsOf<Scalar> RadialObjective<Scalar>::sample_values_of(const RowMatrix<doubl
 template <class Scalar>
 double RadialObjective<Scalar>::first_trial(const Measurements& u, const Measurements& du,
                                             double slope) const {
-  if (contact_.size() == 0) return 1.0;
-  return contact_step<Scalar>(planes_->planes, planes_->stiffness, u.data() + contact_offset(),
-                              du.data() + contact_offset(), slope);
+  if (contact_.rows() == 0) return 1.0;
+  const Index offset = offset_of(contact_place);
+  return contact_.first_trial(u.data() + offset, du.data() + offset, slope);
 }
 
 template <class Scalar>
-bool RadialObjective<Scalar>::accepted(const Measurements& u) const {
-  if (!hooks_.observer) return true;
-  const RadialTerms terms = evaluate(u, nullptr);
-  std::vector<LossTerm> parts{{"stretch", terms.arap.stretch_energy}};
-  if ((bending_.array() > 0).any()) parts.push_back({"bend", terms.arap.energy - terms.arap.stretch_energy});
-  if (style_) parts.push_back({"style", style_->weight * terms.gauss});
-  if (stance_) parts.push_back({"stance", stance_->weight * terms.stance});
-  if (barrier() > 0.0) parts.push_back({"barrier", barrier() * terms.barrier});
-  if (body_) parts.push_back({"motion", terms.body.sum()});
-  if (contact_.size() > 0) parts.push_back({"contact", terms.contact});
-  parts.push_back({"handles", handle_weight() * terms.handles});
-  for (std::size_t i = 0; i < terms.external.size(); ++i)
-    parts.push_back({"energies[" + std::to_string(i) + "]", terms.external[i]});
-  return hooks_.observer(parts);
+std::vector<LossTerm> RadialObjective<Scalar>::parts(const Measurements& u) const {
+  std::vector<LossTerm> result;
+  evaluate(u, nullptr, &result);
+  return result;
+}
+
+template <class Scalar>
+double RadialObjective<Scalar>::contact_value(const Measurements& u) const {
+  return contact_.rows() > 0 ? contact_.value(u.data() + offset_of(contact_place), nullptr) : 0.0;
 }
 
 template <class Scalar>
 void RadialObjective<Scalar>::measure(const RowMatrix<double>& c, Measurements& u) const {
-  u.resize(contact_offset() + 3 * contact_.size());
+  const auto terms = point_terms();
+  u.resize(offset_of(terms.size()));
   samples_.evaluate(c, {u.data(), samples_.size(), JetOrder::second});
   blend_.multiply({u.data(), samples_.size(), JetOrder::second});
   const PointsOf<Scalar> rounded = c.cast<Scalar>();
-  Eigen::Map<PointsOf<Scalar>>(u.data() + handle_offset(), pairs_.sources.rows(), 3) =
-      handle_basis_.times(rounded);
-  if (links_.rows() > 0)
-    Eigen::Map<PointsOf<Scalar>>(u.data() + link_offset(), links_.rows(), 3) = links_.times(rounded);
-  u.segment(center_offset(), 3 * center_count()) =
-      Eigen::Map<const Measurements>(rounded.data(), 3 * center_count());
-  measure_contact(c, u);
+  for (std::size_t i = 0; i < terms.size(); ++i)
+    if (terms[i]->rows() > 0) terms[i]->measure(c, rounded, u.data() + offset_of(i));
 }
 
 template <class Scalar>
 void RadialObjective<Scalar>::measure_contact(const RowMatrix<double>& c, Measurements& u) const {
-  u.conservativeResize(contact_offset() + 3 * contact_.size());
-  if (contact_.size() > 0)
-    contact_.evaluate(c, {u.data() + contact_offset(), contact_.size(), JetOrder::value});
+  const Index offset = offset_of(contact_place);
+  u.conservativeResize(offset + 3 * contact_.rows());
+  if (contact_.rows() > 0) contact_.measure(c, {}, u.data() + offset);
 }
 
 template <class Scalar>
-RadialTerms RadialObjective<Scalar>::evaluate(const Measurements& u, Measurements* cotangents) const {
+Eigen::VectorX<Scalar> RadialObjective<Scalar>::measured(const JetsAt& jets_at) const {
+  const Points& places = problem_.energy_points;
+  RowMatrix<double> jets = jets_at(places, JetOrder::second);
+  if (problem_.blend)
+    RadialBlend<double>(*problem_.blend, places).multiply({jets.data(), places.rows(), JetOrder::second});
+  const auto terms = point_terms();
+  Measurements u(offset_of(terms.size()));
+  u.head(jets.size()) = jets.reshaped<Eigen::RowMajor>().template cast<float>().template cast<Scalar>();
+  for (std::size_t i = 0; i < terms.size(); ++i) {
+    if (terms[i]->rows() == 0) continue;
+    const RowMatrix<double> own = terms[i]->measure_field(jets_at);
+    u.segment(offset_of(i), own.size()) =
+        own.reshaped<Eigen::RowMajor>().template cast<float>().template cast<Scalar>();
+  }
+  return u;
+}
+
+/// The loop over all terms: their sum, cotangents and parts.
+template <class Scalar>
+double RadialObjective<Scalar>::evaluate(const Measurements& u, Measurements* cotangents,
+                                         std::vector<LossTerm>* parts) const {
   if (cotangents != nullptr) cotangents->setZero(u.size());
-  return with_jets(u, [&](JetView<const Scalar> jets) {
-    return evaluate(jets, u, cotangents != nullptr ? cotangents->data() : nullptr);
+  const auto at = [&](Index offset) { return cotangents != nullptr ? cotangents->data() + offset : nullptr; };
+  double value = 0.0;
+  const auto add_points = [&](std::size_t place, const char* name) {
+    const PointTerm<Scalar>& term = *point_terms()[place];
+    if (term.rows() == 0) return;
+    const Index offset = offset_of(place);
+    const double own = term.value(u.data() + offset, at(offset));
+    if (parts != nullptr && name != nullptr) parts->push_back({name, own});
+    value += own;
+  };
+  with_jets(u, [&](JetView<const Scalar> jets) {
+    const JetView<Scalar> jet_cotangents{at(0), samples_.size(), JetOrder::second};
+    const auto add = [&](const JetTerm& term) { value += term.evaluate(jets, jet_cotangents, parts); };
+    add(*terms_.own.front());
+    add_points(0, "handles");
+    std::for_each(terms_.own.begin() + 1, terms_.own.end(), [&](const auto& term) { add(*term); });
+    add_points(contact_place, "contact");
+    for (const auto& term : terms_.callers) add(*term);
   });
-}
-
-template <class Scalar>
-RadialTerms RadialObjective<Scalar>::evaluate(JetView<const Scalar> jets, const Measurements& u,
-                                              Scalar* out) const {
-  const JetView<Scalar> jet_cotangents{out, samples_.size(), JetOrder::second};
-  RadialTerms terms;
-  terms.arap = arap_energy<Scalar>(jets, 1.0, 1.0, jet_cotangents,
-                                   {weights_.size() > 0 ? weights_.data() : nullptr, bending_.data()});
-  const Index pairs = pairs_.sources.rows();
-  terms.handles =
-      handle_energy<Scalar>({u.data() + handle_offset(), pairs, JetOrder::value}, pairs_, handle_weight(),
-                            {out != nullptr ? out + handle_offset() : nullptr, pairs, JetOrder::value});
-  if (style_)
-    terms.gauss = style_energy<Scalar>(jets, style_->normals, style_->preference, style_->targets,
-                                       style_->weights, style_->weight, jet_cotangents);
-  if (stance_)
-    terms.stance =
-        stance_energy<Scalar>(jets, stance_->rest, stance_->stance, stance_->weight, jet_cotangents);
-  if (barrier() > 0.0)
-    terms.barrier =
-        fold_barrier<Scalar>(jets, problem_.options.surface.barrier_threshold, barrier(), jet_cotangents);
-  if (body_) terms.body = body_energy<Scalar>(jets, *body_, jet_cotangents);
-  if (contact_.size() > 0)
-    terms.contact = contact_energy<Scalar>(planes_->planes, planes_->stiffness, u.data() + contact_offset(),
-                                           out != nullptr ? out + contact_offset() : nullptr);
-  terms.external =
-      external_energies<Scalar>(hooks_.energies, problem_.energy_points, jets, hooks_.weight, jet_cotangents);
-  return terms;
+  add_points(1, nullptr);
+  add_points(2, nullptr);
+  return value;
 }
 
 template <class Scalar>
 Eigen::VectorX<Scalar> RadialObjective<Scalar>::weighted(const Measurements& u) const {
   Measurements result = Measurements::Zero(u.size());
-  const Index n = samples_.size(), pairs = pairs_.sources.rows();
+  const Index n = samples_.size();
   for (int c = 1; c < 10; ++c) {
     const Eigen::Map<const PointsOf<Scalar>> from(u.data() + 3 * c * n, n, 3);
     Eigen::Map<PointsOf<Scalar>> to(result.data() + 3 * c * n, n, 3);
@@ -156,28 +142,10 @@ Eigen::VectorX<Scalar> RadialObjective<Scalar>::weighted(const Measurements& u) 
       to = share * (bending_.asDiagonal() * from);
     if (weights_.size() > 0) to = weights_.asDiagonal() * to;
   }
-  Eigen::Map<PointsOf<Scalar>>(result.data() + handle_offset(), pairs, 3) =
-      Scalar(2.0 * handle_weight()) * (pairs_.weights.asDiagonal() * handle_values(u));
-  const Index apart = center_offset() - link_offset();
-  result.segment(link_offset(), apart) = Scalar(2.0) * u.segment(link_offset(), apart);
+  const auto terms = point_terms();
+  for (std::size_t i = 0; i < terms.size(); ++i)
+    if (terms[i]->rows() > 0) terms[i]->model(u.data() + offset_of(i), result.data() + offset_of(i));
   return result;
-}
-
-template <class Scalar>
-double RadialObjective<Scalar>::value(const Measurements& u, Measurements* cotangents) const {
-  const RadialTerms terms = evaluate(u, cotangents);
-  const auto apart = u.segment(link_offset(), 3 * links_.rows());
-  const auto centers = u.segment(center_offset(), 3 * center_count());
-  if (cotangents != nullptr) {
-    cotangents->segment(link_offset(), apart.size()) = Scalar(2.0) * apart;
-    cotangents->segment(center_offset(), centers.size()) = Scalar(2.0 * coefficient_weight) * centers;
-  }
-  return terms.arap.energy + handle_weight() * terms.handles + (style_ ? style_->weight * terms.gauss : 0.0) +
-         (stance_ ? stance_->weight * terms.stance : 0.0) + barrier() * terms.barrier +
-         (body_ ? terms.body.sum() : 0.0) + terms.contact +
-         std::accumulate(terms.external.begin(), terms.external.end(), 0.0) +
-         static_cast<double>(apart.squaredNorm()) +
-         coefficient_weight * static_cast<double>(centers.squaredNorm());
 }
 
 template <class Scalar>
@@ -186,19 +154,13 @@ RowMatrix<double> RadialObjective<Scalar>::pull_back(const Measurements& cotange
   if (blend_.empty()) {
     samples_.pull_back({cotangents.data(), samples_.size(), JetOrder::second}, gradient);
   } else {
-    Measurements own = cotangents.head(handle_offset());
+    Measurements own = cotangents.head(offset_of(0));
     blend_.multiply_transposed({own.data(), samples_.size(), JetOrder::second});
     samples_.pull_back({own.data(), samples_.size(), JetOrder::second}, gradient);
   }
-  gradient += handle_basis_.transpose_times(handle_values(cotangents)).template cast<double>();
-  if (links_.rows() > 0) {
-    const Eigen::Map<const PointsOf<Scalar>> apart(cotangents.data() + link_offset(), links_.rows(), 3);
-    gradient += links_.transpose_times(apart).template cast<double>();
-  }
-  Eigen::Map<Vector>(gradient.data(), 3 * center_count()) +=
-      cotangents.segment(center_offset(), 3 * center_count()).template cast<double>();
-  if (contact_.size() > 0)
-    contact_.pull_back({cotangents.data() + contact_offset(), contact_.size(), JetOrder::value}, gradient);
+  const auto terms = point_terms();
+  for (std::size_t i = 0; i < terms.size(); ++i)
+    if (terms[i]->rows() > 0) terms[i]->pull_back(cotangents.data() + offset_of(i), gradient);
   if (problem_.mirror) problem_.mirror->symmetrise(gradient);
   return gradient;
 }
@@ -206,7 +168,7 @@ RowMatrix<double> RadialObjective<Scalar>::pull_back(const Measurements& cotange
 template <class Scalar>
 RowMatrix<double> RadialObjective<Scalar>::pull_back_contact(const PointsOf<Scalar>& cotangents) const {
   RowMatrix<double> gradient = RowMatrix<double>::Zero(center_count() + 4, 3);
-  contact_.pull_back({cotangents.data(), contact_.size(), JetOrder::value}, gradient);
+  contact_.pull_back(cotangents.data(), gradient);
   if (problem_.mirror) problem_.mirror->symmetrise(gradient);
   return gradient;
 }

@@ -159,7 +159,7 @@ Index RadialSolver::follow(Index iterations, double tolerance, const Progress& p
     ContactSolve(s, iterations, std::max(tolerance, single_tolerance), freely, progress).follow();
   else
     freely(iterations);
-  if (!s.handles.any() && s.hooks.energies.empty() && !s.contact.has_planes()) anchor_lowest_point(s);
+  if (!s.handles.any() && !s.hooks.adds_terms() && !s.contact.has_planes()) anchor_lowest_point(s);
   s.contact.end_at(s.shape.revision);
   s.report.contact.crossing.clear();
   for (const Index k : s.contact.crossing_surfaces())

@@ -8,6 +8,7 @@
 #include "core/types.h"
 #include "energies/arap.h"
 #include "energies/distortion.h"
+#include "optimize/iteration.h"
 #include "solve/contact.h"
 
 namespace arapfields {
@@ -19,6 +20,7 @@ struct RadialReport {
   double value = 0.0;        ///< the objective
   double handle_mean = 0.0;  ///< distance to the targets
   double handle_max = 0.0;
+  std::vector<LossTerm> terms;       ///< the weighted terms of the objective
   std::optional<double> preference;  ///< preference_of() a style, where there is one
   double kinetic = 0.0;              ///< kinetic energy, in the unit of `value`; 0 after a solve
   double speed = 0.0;                ///< root mean square over the samples, mesh units a second

@@ -5,6 +5,7 @@
 #include <bit>
 
 #include "energies/distortion.h"
+#include "sampling/sample_choice.h"
 #include "solve/warnings.h"
 
 namespace arapfields {
@@ -14,6 +15,8 @@ namespace {
 constexpr int most_uses = 16;
 /// Relative error of the objective in single precision.
 constexpr double single_error = 1e-6;
+/// Least fold barrier while handles pull into contact.
+constexpr double contact_barrier = 10.0;
 
 }  // namespace
 
@@ -57,13 +60,37 @@ TallMatrix<float> RadialState::factor(double inertia) {
   if (const RowMatrix<double>& rows = handles.links().rows(); rows.rows() > 0)
     add(rows, Vector::Ones(rows.rows()));
   if (const auto& stance = style.stance(handles.any())) {
-    auto [rows, shares] = stance_rows(problem.basis, stance->rest, stance->stance);
+    auto [rows, shares] = stance_rows(problem.basis, problem.energy_points, stance->stance);
     add(std::move(rows), stance->weight * shares);
   }
   if (inertia > 0.0)
     add(radial_rows(problem.basis, problem.energy_points, JetOrder::value),
         0.5 * inertia / static_cast<double>(problem.energy_points.rows()) * dynamics.masses());
   return TallMatrix<float>(inverse_factor(stiffness.matrix(), values, weights), true);
+}
+
+JetTermList RadialState::jet_terms(std::optional<Body<double>> body) {
+  JetTermSettings settings;
+  if (const auto& weighted = style.style()) {
+    settings.style = weighted->style;
+    settings.gauss = weighted->weight;
+  }
+  if (const auto& weighted = style.stance(handles.any())) {
+    settings.stance = weighted->stance;
+    settings.keep_stance = weighted->weight;
+  }
+  settings.barrier = std::max(problem.options.surface.barrier, contact.has_planes() ? contact_barrier : 0.0);
+  settings.barrier_threshold = problem.options.surface.barrier_threshold;
+  settings.body = std::move(body);
+  settings.external = hooks.energies;
+  settings.external_weight = hooks.weight;
+  settings.further = hooks.terms;
+  JetTermList terms(settings);
+  TermBatch batch{problem.energy_points, Points(0, 3), stiffness.weights(), stiffness.bending(), {}};
+  if (problem.samples.normals.rows() > 0)
+    batch.normals = rows_of(problem.samples.normals, problem.energy_samples);
+  terms.set_batch(batch);
+  return terms;
 }
 
 template <class Scalar>
@@ -75,16 +102,11 @@ RadialObjective<Scalar>& RadialState::objective(RadialPrecision<Scalar>& precisi
   if (precision.handles != handles.revision())
     result.set_handles(handles.pairs(), handles.basis_values(), handles.links());
   precision.handles = handles.revision();
-  const auto cast = [](const auto& term) {
-    return term ? std::optional(term->template cast<Scalar>()) : std::nullopt;
-  };
   result.set_targets(handles.pairs().targets);
   result.set_preconditioner(preconditioner.inverse_factor.latest());
   result.set_stiffness(stiffness.bending(), stiffness.weights());
-  result.set_style(cast(style.style()));
-  result.set_stance(cast(style.stance(handles.any())));
-  result.set_body(dynamics.inertia_terms<Scalar>());
-  result.set_hooks(hooks);
+  result.set_terms(jet_terms(dynamics.body()));
+  result.set_observer(hooks.observer);
   if (precision.contact != contact.found().revision) {
     Eigen::VectorX<Scalar> u = precision.u.take(measured_revisions());
     result.set_contact(contact.found());
@@ -161,12 +183,23 @@ template <class Scalar>
 void RadialState::measure(RadialPrecision<Scalar>& precision) {
   const RadialObjective<Scalar>& measured = objective(precision);
   const Eigen::VectorX<Scalar>& u = measurements(precision);
-  const RadialTerms terms = measured.terms(u);
-  report.arap = terms.arap;
-  report.preference.reset();
-  if (const auto& term = style.style()) report.preference = preference_of(term->preference, terms.gauss);
-  report.distortion =
-      measured.with_jets(u, [](JetView<const Scalar> jets) { return distortion<Scalar>(jets); });
+  report.terms = measured.parts(u);
+  measured.with_jets(u, [&](JetView<const Scalar> jets) {
+    const Eigen::VectorX<Scalar> weights = stiffness.weights().template cast<Scalar>(),
+                                 bending = stiffness.bending().template cast<Scalar>();
+    report.arap = arap_energy<Scalar>(jets, 1.0, 1.0, {},
+                                      {weights.size() > 0 ? weights.data() : nullptr, bending.data()});
+    report.distortion = distortion<Scalar>(jets);
+    report.preference.reset();
+    if (const auto& weighted = style.style()) {
+      const Points normals = rows_of(problem.samples.normals, problem.energy_samples);
+      const StyleAtSamples& at = weighted->style;
+      const double energy = style_energy<Scalar>(jets, normals.template cast<Scalar>(), at.preference,
+                                                 at.targets.template cast<Scalar>(),
+                                                 at.weights.template cast<Scalar>(), 0.0, {});
+      report.preference = preference_of(at.preference, energy);
+    }
+  });
   report.warnings =
       warnings_on(report.distortion, far_target(handles.bound(), problem.surface()), handles.bound());
   for (std::string& note : notes_on(report.contact)) report.warnings.push_back(std::move(note));

@@ -60,6 +60,8 @@ struct RadialState {
 
   /// Factors the preconditioner for this inertia, if it or a part has changed.
   void precondition(double inertia);
+  /// The terms of jets of the current parts, for the energy samples.
+  JetTermList jet_terms(std::optional<Body<double>> body);
   /// The objective of the current parts, without inertia.
   template <class Scalar>
   RadialObjective<Scalar>& objective(RadialPrecision<Scalar>& precision);

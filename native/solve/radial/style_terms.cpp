@@ -18,8 +18,8 @@ void StyleTerms::set(const StyleRequest& request) {
   if (request.strength == 0.0) return clear();
   require(problem_.samples.normals.rows() == count, "samples", "they have no normals",
           "a style needs samples with normals");
-  StyleTerm<double> style = at_samples(request);
-  if (style.idle()) return clear();
+  WeightedStyle style = at_samples(request);
+  if (style.style.idle(rows_of(problem_.samples.normals, problem_.energy_samples))) return clear();
   require(request.up.allFinite() && request.up.norm() > 0.0, "up", "zero, NaN or infinite",
           "a finite direction is needed");
   if (!any() || request_->up != request.up) ++stance_revision_;
@@ -32,26 +32,26 @@ void StyleTerms::clear() {
   ++revision_;
 }
 
-const std::optional<StyleTerm<double>>& StyleTerms::style() {
+const std::optional<WeightedStyle>& StyleTerms::style() {
   return style_.get({problem_.energy_revision, revision_},
                     [&] { return any() ? std::optional(at_samples(*request_)) : std::nullopt; });
 }
 
-StyleTerm<double> StyleTerms::at_samples(const StyleRequest& request) const {
+WeightedStyle StyleTerms::at_samples(const StyleRequest& request) const {
   const Points normals = rows_of(problem_.samples.normals, problem_.energy_samples);
   StyleAtSamples style = StyleAtSamples::of(request.style, normals, request.sharpness);
   if (request.weights.size() > 0)
     style.weights.array() *= entries_of(request.weights, problem_.energy_samples).array();
   const double weight = request.strength * problem_.options.gauss_weight * style.factor;
-  return {std::move(style.preference), normals, std::move(style.targets), std::move(style.weights), weight};
+  return {std::move(style), weight};
 }
 
-const std::optional<StanceTerm<double>>& StyleTerms::stance(bool has_handles) {
+const std::optional<WeightedStance>& StyleTerms::stance(bool has_handles) {
   const Revision revision = stance_revision(has_handles);
-  return stance_.get({problem_.energy_revision, revision}, [&]() -> std::optional<StanceTerm<double>> {
+  return stance_.get({problem_.energy_revision, revision}, [&]() -> std::optional<WeightedStance> {
     if (revision == 0) return std::nullopt;
-    return StanceTerm<double>{Stance::of(problem_.surface(), request_->up).at(problem_.energy_samples),
-                              problem_.energy_points, problem_.options.keep_stance};
+    return WeightedStance{Stance::of(problem_.surface(), request_->up).at(problem_.energy_samples),
+                          problem_.options.keep_stance};
   });
 }
 

@@ -3,12 +3,33 @@
 
 #include <optional>
 
+#include "energies/stance.h"
+#include "energies/style.h"
 #include "solve/radial/problem.h"
-#include "solve/radial/terms.h"
 
 namespace arapfields {
 
-/// The style term at the energy samples, and the stance term of a styled figure without handles.
+struct StyleRequest {
+  Style style;
+  double strength;
+  double sharpness;  ///< 0: the style's own
+  Vector weights;    ///< of all samples; empty: all 1
+  Vec3 up;           ///< the figure's upward direction
+};
+
+/// A style at the energy samples, and its weight.
+struct WeightedStyle {
+  StyleAtSamples style;
+  double weight = 1.0;  ///< λ_Gauss
+};
+
+/// A stance of the energy samples, and its weight.
+struct WeightedStance {
+  Stance stance;
+  double weight = 0.0;
+};
+
+/// The style at the energy samples, and the stance of a styled figure without handles.
 class StyleTerms {
  public:
   explicit StyleTerms(const RadialProblem& problem) : problem_(problem) {}
@@ -19,8 +40,8 @@ class StyleTerms {
 
   bool any() const { return request_.has_value(); }
   const std::optional<StyleRequest>& request() const { return request_; }
-  const std::optional<StyleTerm<double>>& style();
-  const std::optional<StanceTerm<double>>& stance(bool has_handles);
+  const std::optional<WeightedStyle>& style();
+  const std::optional<WeightedStance>& stance(bool has_handles);
   Revision revision() const { return revision_; }
   /// Revision of the stance, which does not depend on the style's strength; 0 without one.
   Revision stance_revision(bool has_handles) const {
@@ -28,15 +49,15 @@ class StyleTerms {
   }
 
  private:
-  StyleTerm<double> at_samples(const StyleRequest& request) const;
+  WeightedStyle at_samples(const StyleRequest& request) const;
   bool keeps_stance(bool has_handles) const {
     return any() && !has_handles && problem_.options.keep_stance > 0.0;
   }
 
   const RadialProblem& problem_;
   std::optional<StyleRequest> request_;
-  Dependent<std::optional<StyleTerm<double>>, 2> style_;
-  Dependent<std::optional<StanceTerm<double>>, 2> stance_;
+  Dependent<std::optional<WeightedStyle>, 2> style_;
+  Dependent<std::optional<WeightedStance>, 2> stance_;
   Revision revision_ = 0;
   Revision stance_revision_ = 0;
 };

@@ -4,12 +4,10 @@
 #include <memory>
 #include <optional>
 
-#include "energies/external_energy.h"
 #include "energies/handles.h"
-#include "energies/stance.h"
-#include "energies/style.h"
 #include "mesh/surface_samples.h"
 #include "options/handles.h"
+#include "solve/jet_terms.h"
 #include "solve/surface_stiffness.h"
 #include "solve/trained/objective.h"
 
@@ -17,24 +15,14 @@ namespace arapfields {
 
 class Tensor;
 
-/// The terms of a trained deformation, with their weights:
-///   rigidity·mean w(stretch + λ·bend) + gauss·style + keep_stance·stance + barrier·fold_barrier +
-///   handles + external.
-struct ObjectiveTerms {
-  Index batch = 0;  ///< samples an iteration
-  Index fresh = 0;  ///< number of the batch's samples that samples.redraw draws anew
-  double rigidity = 1.0;
+/// The terms of a trained deformation: those of jets, and handles.
+struct ObjectiveTerms : JetTermSettings {
+  Index batch = 0;             ///< samples an iteration
+  Index fresh = 0;             ///< number of the batch's samples that samples.redraw draws anew
   SurfaceStiffness stiffness;  ///< λ
   Vector weights;              ///< w, one a sample; empty: all 1
-  double barrier = 0.0;
-  double barrier_threshold = SurfaceOptions().barrier_threshold;
-  StyleAtSamples style;  ///< its weights: one a sample, or empty: all 1
-  double gauss = 0.0;    ///< weight of the style
-  double keep_stance = 0.0;
-  Stance stance;  ///< of the samples
   BoundHandles handles;
   HandleOptions pull;
-  ExternalEnergies external;
 };
 
 /// Estimates the terms on random subsets of the samples, by stratified sampling: the samples are put in
@@ -50,32 +38,14 @@ class FieldObjective final : public Objective {
   const ObjectiveTerms& objective_terms() const { return terms_; }
 
  private:
-  /// Samples of one iteration: λ and w, and normals and the style's targets and weights where the terms use
-  /// them.
-  struct Batch {
-    Points points;
-    Points normals;
-    Points targets;
-    Vector bending;
-    Vector weights;
-    Vector style_weights;
-    Stance stance;
-  };
-  /// Tensors on the field's device that do not change between batches.
-  struct Constants;
-
-  Batch draw(Random& random);
-  bool styled() const { return terms_.style.any() && terms_.gauss > 0.0; }
-  bool stands() const { return terms_.keep_stance > 0.0; }
+  TermBatch draw(Random& random);
   bool pulled() const { return terms_.handles.count() > 0 && terms_.pull.handle_weight != 0.0; }
-  JetOrder order_of_terms() const {
-    return highest_order(terms_.external, terms_.stiffness.bends() ? JetOrder::second : JetOrder::first);
-  }
   template <class Scalar>
   double by_kernels(TrainableField& field, Random& random);
   Tensor by_compositions(TrainableField& field, Random& random);
-  /// Adds the external energies of jets on a device, and their cotangents.
-  void add_external(const Points& points, const Tensor& jets, Tensor cotangents, Tensor& value);
+  /// Calls call(term) for each term of jets.
+  template <class Call>
+  void for_terms(Call&& call) const;
 
   /// Row of `pool_` of the next fresh sample; redraws the pool, as large as the samples, when it is used up.
   Index next_fresh(Random& random);
@@ -87,11 +57,11 @@ class FieldObjective final : public Objective {
   SurfaceSamples pool_;
   Vector pool_bending_;
   Index used_ = 0;
-  std::unique_ptr<Constants> constants_;
-  /// The last estimate's weighted terms, on the device where they were computed.
-  struct Computed;
-  std::vector<Computed> computed_;
-  std::vector<double> external_;  // the last estimate's external energies, weighted
+  JetTermList list_;
+  std::unique_ptr<EnergyTables> tables_;  // on the field's device
+  // The last estimate's weighted terms, where they were computed.
+  std::vector<LossTerm> parts_;
+  std::vector<ComposedPart> composed_parts_;
 };
 
 }  // namespace arapfields

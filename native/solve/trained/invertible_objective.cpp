@@ -39,7 +39,7 @@ Tensor InvertibleObjective::accumulate(TrainableField& field, Random& random) {
 
 std::vector<LossTerm> InvertibleObjective::terms() const {
   std::vector<LossTerm> terms = inner_.terms();
-  terms.push_back({"invertibility", cycle_->number()});
+  if (cycle_) terms.push_back({"invertibility", cycle_->number()});
   return terms;
 }
 
