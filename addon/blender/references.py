@@ -81,14 +81,36 @@ def copy_property(given, there, path):
         there.id_properties_ui(name).update_from(given.id_properties_ui(name))
 
 
-def copy_modifiers(item, given):
-    """Replaces an object's modifiers by copies of these, of another object."""
+def copy_modifiers(context, item, given):
+    """Replaces an object's modifiers by copies of these, of another object.
+
+    By Blender's operator: hair, bindings and settings of simulations are no properties of a modifier.
+    """
     item.modifiers.clear()
     for one in given:
-        made = item.modifiers.new(one.name, one.type)
-        if one.type == "PARTICLE_SYSTEM":  # new ones have hair of their own
-            made.particle_system.settings = one.particle_system.settings
-            made.particle_system.seed = one.particle_system.seed
-        for path in paths_of(one):
-            with contextlib.suppress(TypeError):  # an enum without items, whose value is ""
-                put_at(made, path, one.path_resolve(path))
+        both = [one.id_data, item]
+        named = {"object": one.id_data, "active_object": one.id_data}
+        if one.type == "PARTICLE_SYSTEM" and not one.particle_system.is_edited:
+            made = item.modifiers.new(one.name, one.type)
+            made.show_viewport, made.show_render = one.show_viewport, one.show_render
+            own = made.particle_system.settings
+            copy_properties(one.particle_system, made.particle_system)  # the settings are shared
+            if own.users == 0:
+                bpy.data.particles.remove(own)
+            continue
+        try:
+            with context.temp_override(**named, selected_objects=both, selected_editable_objects=both):
+                bpy.ops.object.modifier_copy_to_selected(modifier=one.name)
+        except RuntimeError:  # Blender copies no Collision and no Hook
+            made = item.modifiers.new(one.name, one.type)
+            copy_properties(one, made)
+            if hasattr(one, "settings"):
+                copy_properties(one.settings, made.settings)
+            if one.type == "HOOK" and len(one.vertex_indices):
+                made.vertex_indices_set(list(one.vertex_indices))
+
+
+def copy_properties(given, made):
+    for path in paths_of(given):
+        with contextlib.suppress(TypeError):  # an enum without items, whose value is ""
+            put_at(made, path, given.path_resolve(path))
