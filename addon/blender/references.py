@@ -81,36 +81,34 @@ def copy_property(given, there, path):
         there.id_properties_ui(name).update_from(given.id_properties_ui(name))
 
 
-def copy_modifiers(context, item, given):
-    """Replaces an object's modifiers by copies of these, of another object.
-
-    By Blender's operator: hair, bindings and settings of simulations are no properties of a modifier.
-    """
+def copy_modifiers(item, given):
+    """Replaces an object's modifiers by copies of these, of another object; returns the names of those that
+    are not whole, as scripts can copy neither what is bound nor combed hair."""
     item.modifiers.clear()
+    partial = []
     for one in given:
-        both = [one.id_data, item]
-        named = {"object": one.id_data, "active_object": one.id_data}
-        if one.type == "PARTICLE_SYSTEM" and not one.particle_system.is_edited:
-            made = item.modifiers.new(one.name, one.type)
-            made.show_viewport, made.show_render = one.show_viewport, one.show_render
+        made = item.modifiers.new(one.name, one.type)
+        copy_properties(one, made)
+        if one.type == "HOOK" and len(one.vertex_indices):
+            made.vertex_indices_set(list(one.vertex_indices))
+        if one.type == "PARTICLE_SYSTEM":
             own = made.particle_system.settings
             copy_properties(one.particle_system, made.particle_system)  # the settings are shared
             if own.users == 0:
                 bpy.data.particles.remove(own)
-            continue
-        try:
-            with context.temp_override(**named, selected_objects=both, selected_editable_objects=both):
-                bpy.ops.object.modifier_copy_to_selected(modifier=one.name)
-        except RuntimeError:  # Blender copies no Collision and no Hook
-            made = item.modifiers.new(one.name, one.type)
-            copy_properties(one, made)
-            if hasattr(one, "settings"):
-                copy_properties(one.settings, made.settings)
-            if one.type == "HOOK" and len(one.vertex_indices):
-                made.vertex_indices_set(list(one.vertex_indices))
+        bound = any(getattr(one, name, False) for name in ("is_bound", "is_bind"))
+        if bound or (one.type == "PARTICLE_SYSTEM" and one.particle_system.is_edited):
+            partial.append(one.name)
+    return partial
 
 
 def copy_properties(given, made):
+    """Copies the writable properties of a modifier, and of its groups of settings."""
     for path in paths_of(given):
         with contextlib.suppress(TypeError):  # an enum without items, whose value is ""
             put_at(made, path, given.path_resolve(path))
+    for one in given.bl_rna.properties:
+        if one.type == "POINTER" and one.is_readonly and one.identifier.endswith("settings"):
+            group, own = getattr(given, one.identifier), getattr(made, one.identifier)
+            if group is not None and own is not None:
+                copy_properties(group, own)

@@ -84,9 +84,8 @@ class ARAPFIELDS_OT_wrap_sheet(JobOperator, bpy.types.Operator):
     def conclude(self, context, job):
         result = yield from super().conclude(context, job)
         if self.cells:
-            from arapfields.cli import contact_sheet
-
             from arapfields._files import write_text
+            from arapfields.cli import contact_sheet
 
             path = Path(bpy.path.abspath(self.place()))
             page = contact_sheet.page(cell for _, cell in sorted(self.cells, key=lambda one: -one[0]))
