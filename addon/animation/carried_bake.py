@@ -165,7 +165,10 @@ class CarriedBake:
         mesh = result_objects.shown_mesh(context, item, len(self.shapes[carried][0]), in_place=True)
         report = {"frames": self.frames.count}
         baked = result_objects.show(context, item, "BAKE", "BAKE", mesh, report, select=False)
-        references.copy_modifiers(baked, modifier_stack.behind(item))
+        partial = references.copy_modifiers(baked, modifier_stack.behind(item))
+        if partial:
+            names = ", ".join(partial)
+            self.warnings.append(UserError("{name}: bind or comb {modifiers} again", baked, modifiers=names))
         source = self.carrying.source.get()
         own = {source: result_objects.existing(context, source, "BAKE", "BAKE")}
         references.remap(references.parts_of(baked), own)

@@ -82,13 +82,33 @@ def copy_property(given, there, path):
 
 
 def copy_modifiers(item, given):
-    """Replaces an object's modifiers by copies of these, of another object."""
+    """Replaces an object's modifiers by copies of these, of another object; returns the names of those that
+    are not whole, as scripts can copy neither what is bound nor combed hair."""
     item.modifiers.clear()
+    partial = []
     for one in given:
         made = item.modifiers.new(one.name, one.type)
-        if one.type == "PARTICLE_SYSTEM":  # new ones have hair of their own
-            made.particle_system.settings = one.particle_system.settings
-            made.particle_system.seed = one.particle_system.seed
-        for path in paths_of(one):
-            with contextlib.suppress(TypeError):  # an enum without items, whose value is ""
-                put_at(made, path, one.path_resolve(path))
+        copy_properties(one, made)
+        if one.type == "HOOK" and len(one.vertex_indices):
+            made.vertex_indices_set(list(one.vertex_indices))
+        if one.type == "PARTICLE_SYSTEM":
+            own = made.particle_system.settings
+            copy_properties(one.particle_system, made.particle_system)  # the settings are shared
+            if own.users == 0:
+                bpy.data.particles.remove(own)
+        bound = any(getattr(one, name, False) for name in ("is_bound", "is_bind"))
+        if bound or (one.type == "PARTICLE_SYSTEM" and one.particle_system.is_edited):
+            partial.append(one.name)
+    return partial
+
+
+def copy_properties(given, made):
+    """Copies the writable properties of a modifier, and of its groups of settings."""
+    for path in paths_of(given):
+        with contextlib.suppress(TypeError):  # an enum without items, whose value is ""
+            put_at(made, path, given.path_resolve(path))
+    for one in given.bl_rna.properties:
+        if one.type == "POINTER" and one.is_readonly and one.identifier.endswith("settings"):
+            group, own = getattr(given, one.identifier), getattr(made, one.identifier)
+            if group is not None and own is not None:
+                copy_properties(group, own)

@@ -12,7 +12,7 @@ from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..handles import empties
 from . import files
-from .single import failure, objects_to_solve, progress
+from .single import failure, objects_to_solve, progress, tell_of_others
 
 EXPORTS = {".abc": "ABC", ".usdc": "USD", ".glb": "GLTF"}
 
@@ -27,6 +27,7 @@ def run_bake(options, _):
         if place:
             files.check_place(place)
     sources = objects_to_solve(options) if options.objects else animated(options)
+    tell_of_others(options, moves)
     with progress(options.quiet), chosen(sources):
         if suffix in EXPORTS:
             reason = failure(
@@ -75,10 +76,15 @@ def frames(options):
 def animated(options):
     """The objects with handles or with an animated style."""
     meshes = [item for item in bpy.context.view_layer.objects if is_source(item)]
-    meshes = [item for item in meshes if empties.used(item) or kind_of(item, "AUTO") == "STYLIZE"]
+    meshes = [item for item in meshes if moves(item)]
     if not meshes:
         raise UserError(f"{options.input}: no object has handles, or a style with keyframes")
     return meshes
+
+
+def moves(item):
+    """Whether an object has handles, or an animated style."""
+    return bool(empties.used(item)) or kind_of(item, "AUTO") == "STYLIZE"
 
 
 @contextlib.contextmanager

@@ -93,6 +93,7 @@ def write(path, items):
         item.select_set(True)
     from arapfields._files import whole_file, write_text
 
+    text = None
     with whole_file(path) as partial:
         export(partial, items)
         if not partial.is_file() or not is_whole(partial, [item.data for item in items]):
@@ -100,7 +101,8 @@ def write(path, items):
         materials = partial.with_suffix(".mtl")
         if materials.exists():
             text = materials.read_text(encoding="utf-8", errors="surrogateescape")
-            write_text(path.with_suffix(".mtl"), relative_textures(text, path.parent))
+    if text is not None:  # after the mesh: that of an earlier one stays with it
+        write_text(path.with_suffix(".mtl"), relative_textures(text, path.parent))
 
 
 def export(path, items):

@@ -36,6 +36,8 @@ def run_single(options, _):
     files.check(options.output)
     files.read(options.input)
     sources = objects_to_solve(options)
+    if options.solve_verb == "deform" and not options.handles:
+        tell_of_others(options, empties.used)
     for place in (options.output, options.report):
         if place:
             files.check_place(place)
@@ -79,6 +81,20 @@ def objects_to_solve(options):
     if not meshes:
         raise UserError(f"{options.input}: holds no mesh object")
     return meshes
+
+
+def tell_of_others(options, is_meant):
+    """Names the meshes for which `is_meant` holds that are in no view of the scene, and so are left out."""
+    shown = set(bpy.context.view_layer.objects)
+    others = [item for item in bpy.data.objects if item not in shown and item.users > 0 and is_source(item)]
+    names = sorted(item.name for item in others if not settings_of(item).made_from and is_meant(item))
+    if names and not options.objects:
+        named = ", ".join(names)
+        print(
+            f"arapfields: left out, in another scene or a collection that is excluded: {named}",
+            file=sys.stderr,
+            flush=True,
+        )
 
 
 def add_handles(source, path):

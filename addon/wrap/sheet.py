@@ -44,19 +44,23 @@ class ARAPFIELDS_OT_wrap_sheet(JobOperator, bpy.types.Operator):
     guide = "wrap"
 
     filepath: path_text(
-        "File", "Where the page goes, as .html", "FILE", default="//wraps.html", options={"SKIP_SAVE"}
+        "File", "Where the page goes; empty for one beside the .blend", "FILE", options={"SKIP_SAVE"}
     )
 
     @classmethod
     def refuses(cls, source):
         return transfer.not_wrapped(source)
 
+    def place(self):
+        """The page's path; without one given it has the .blend's name, as others may lie in the folder."""
+        return self.filepath or f"//{Path(bpy.data.filepath).stem} wraps.html"
+
     def prepare(self, context, job):
         self.cells = []
         return (yield from super().prepare(context, job))
 
     def plan(self, context, source, weights):
-        if self.filepath.startswith("//") and not bpy.data.filepath:
+        if self.place().startswith("//") and not bpy.data.filepath:
             raise UserError("Save the .blend first: the page lies beside it")
         report = report_of(source)
         target = landmarks.target_of(source)
@@ -80,13 +84,14 @@ class ARAPFIELDS_OT_wrap_sheet(JobOperator, bpy.types.Operator):
     def conclude(self, context, job):
         result = yield from super().conclude(context, job)
         if self.cells:
+            from arapfields._files import write_text
             from arapfields.cli import contact_sheet
 
-            path = Path(bpy.path.abspath(self.filepath))
+            path = Path(bpy.path.abspath(self.place()))
             page = contact_sheet.page(cell for _, cell in sorted(self.cells, key=lambda one: -one[0]))
             try:
-                path.write_text(page, encoding="utf-8")
-            except OSError as error:
+                write_text(path, page)
+            except (ValueError, OSError) as error:
                 self.add_message("ERROR", translated(error))
                 return {"CANCELLED"}
             self.add_message("INFO", str(path))

@@ -108,10 +108,10 @@ std::pair<SurfaceSamples, py::dict> samples_of_state(const py::tuple& parts) {
 }
 
 /// A copy that can be drawn anew, as its original can.
-py::object copied(const py::object& self) {
-  py::object result = py::cast(SurfaceSamples(self.cast<const SurfaceSamples&>()));
+SurfaceSamplesResult copied(const SurfaceSamplesResult& self) {
+  const py::object result = py::cast(SurfaceSamples(self.cast<const SurfaceSamples&>()));
   result.attr("__dict__").attr("update")(self.attr("__dict__"));
-  return result;
+  return SurfaceSamplesResult(result);
 }
 
 std::string text(const Frame& frame) {
@@ -176,7 +176,9 @@ mean w (stretch + λ b bend). InvalidInput for other counts, and for negative or
       .def("__len__", [](const SurfaceSamples& s) { return s.size(); })
       .def(py::pickle(&state_of, &samples_of_state))
       .def("__copy__", &copied)
-      .def("__deepcopy__", [](const py::object& self, const py::object&) { return copied(self); })
+      .def(
+          "__deepcopy__", [](const SurfaceSamplesResult& self, const py::dict&) { return copied(self); },
+          "memo"_a)
       .def("__repr__", [](const SurfaceSamples& s) {
         return "SurfaceSamples(" + std::to_string(s.size()) + " points, " + text(s.frame) + ")";
       });

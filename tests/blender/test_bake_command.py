@@ -32,6 +32,29 @@ def scene(blender, tmp_path):
     return folder
 
 
+def save_two_scenes(folder):
+    """In the worker: a second scene and an excluded collection with bars of their own."""
+    baking.saved_animation("Bar", Path(folder))
+    home, shown = bpy.data.collections.new("Away"), bpy.context.scene
+    shown.collection.children.link(home)
+    bpy.context.view_layer.active_layer_collection = bpy.context.view_layer.layer_collection.children["Away"]
+    baking.animated("Excluded")
+    bpy.context.window.scene = bpy.data.scenes.new("Other")
+    baking.animated("Elsewhere")
+    bpy.context.window.scene = shown
+    bpy.context.view_layer.layer_collection.children["Away"].exclude = True
+    shown.frame_end = 3
+    bpy.ops.wm.save_as_mainfile(filepath=str(Path(folder) / "two.blend"))
+
+
+def test_objects_that_are_left_out_are_named(blender, command, tmp_path):
+    blender.call(__file__, "save_two_scenes", {"folder": tmp_path})
+    done = command("bake", "-i", tmp_path / "two.blend")
+    assert "left out, in another scene or a collection that is excluded: Elsewhere, Excluded" in done.stderr
+    assert [path.name for path in (tmp_path / "cache").iterdir()] == ["two~Scene~Bar.pc2"]
+    assert "left out" not in command("bake", "-i", tmp_path / "two.blend", "--objects", "Bar").stderr
+
+
 def save_scenes_with_it_disabled(folder):
     """In the worker: the same with shape keys, elsewhere; shown, or disabled by itself or its collection."""
     bar, _ = baking.saved_animation("Bar", Path(folder))

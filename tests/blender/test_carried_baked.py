@@ -10,9 +10,46 @@ if IN_BLENDER:
     from support.blender import scenes
     from support.blender.live import step
 
+    from addon.blender import modifier_stack
+    from addon.core.runtime import jobs
     from addon.field_modifier import inputs
 
 pytestmark = pytest.mark.in_blender
+
+
+def test_hair_and_hooks_are_on_the_baked_object_and_what_is_bound_is_named():
+    bar, _, _ = scenes.bar_with_handles()
+    sleeve = scenes.bar("Sleeve", 0.6)
+    hook, cage = bpy.data.objects.new("Hook", None), scenes.bar("Cage", 0.9)
+    cage.scale = (1.0, 2.0, 2.0)
+    bpy.context.collection.objects.link(hook)
+    scenes.activate(sleeve)
+    sleeve.modifiers.new("Finer", "SUBSURF")
+    sleeve.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    settings = sleeve.particle_systems[0].settings
+    settings.type, settings.count, sleeve.particle_systems[0].seed = "HAIR", 40, 7
+    sleeve.modifiers.new("Cloth", "COLLISION")
+    sleeve.collision.damping = 0.25
+    scenes.activate(sleeve, bar)
+    bpy.ops.arapfields.carry()
+    bpy.context.scene.frame_set(1)
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    hooked, bound = sleeve.modifiers.new("Hook", "HOOK"), sleeve.modifiers.new("Bound", "SURFACE_DEFORM")
+    hooked.object, bound.target = hook, cage
+    hooked.vertex_indices_set([0, 5, 9])
+    bpy.context.view_layer.update()
+    scenes.activate(sleeve)
+    assert bpy.ops.object.surfacedeform_bind(modifier="Bound") == {"FINISHED"}
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.bake(format="KEYS", start=1, end=2) == {"FINISHED"}
+    baked = bpy.data.objects["Sleeve_baked"]
+    behind = modifier_stack.behind(sleeve)
+    assert [one.name for one in baked.modifiers] == [one.name for one in behind]
+    assert list(baked.modifiers["Hook"].vertex_indices) == [0, 5, 9]
+    assert ("WARNING", "Bar: Sleeve_baked: bind or comb Bound again") in jobs.messages(), jobs.messages()
+    assert baked.collision.damping == 0.25
+    (hair,) = baked.particle_systems
+    assert (hair.settings, hair.seed) == (settings, 7)
 
 
 def test_modifiers_behind_the_field_act_on_the_baked_object_too():

@@ -88,7 +88,7 @@ def menu_rows():
 
 
 def test_a_press_overwrites_only_what_is_the_objects_own_or_confirmed():
-    """A script has confirmed by its call."""
+    """A script confirms a bake by an argument, an export by its call."""
     folder = five_frames()
     cache, file, asked = folder / "a.pc2", folder / "a.glb", []
     has_window, ask = bake_operator.has_window, bake_operator.ask
@@ -100,6 +100,9 @@ def test_a_press_overwrites_only_what_is_the_objects_own_or_confirmed():
             path.write_bytes(b"another's")
             assert pressed(cls, filepath=str(path), **given) == {"CANCELLED"} and asked.pop() == [path]
             assert pressed(cls, filepath=str(path), overwrite=True, **given) == {"FINISHED"}
+        with pytest.raises(RuntimeError, match="is there, and not of this object"):
+            bpy.ops.arapfields.bake(filepath=str(cache))
+        bpy.ops.arapfields.bake(filepath=str(cache), overwrite=True)
         bpy.ops.arapfields.bake(filepath=str(cache))
         assert pressed(bake, filepath=str(cache)) == {"FINISHED"} and not asked
     finally:

@@ -76,7 +76,7 @@ def function_of(kind: Any, frame: Any) -> Any:
     return function
 
 
-def python_function(item: Any, _protocol: int = 2) -> tuple[Any, tuple[Any, Any], dict[str, Any] | None]:
+def python_function(item: ImplicitFunction, _protocol: int = 2) -> tuple[object, ...]:
     """An object of a subclass of ImplicitFunction by its frame and attributes."""
     return function_of, (type(item), item.frame), dict(getattr(item, "__dict__", {})) or None
 
