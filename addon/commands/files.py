@@ -6,15 +6,19 @@ import errno
 import os
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import bpy
+import numpy as np
 
+from ..blender import mesh_arrays
 from ..blender.object_references import is_source
 from ..core.errors import UserError
 from .export_check import is_whole
 from .parser import FORMATS
 
+NOTICED = 1e-6  # share of a mesh's size: a loss from single precision of which users are told
 ROOM = 1 << 20  # bytes; a disk with less free space counts as full
 AXES = {"forward_axis": "Y", "up_axis": "Z"}  # no conversion of axes
 READ = {
@@ -76,6 +80,22 @@ def read(path):
         raise UserError(f"{path}: Blender cannot read it ({reason})") from error
     if not any(is_source(item) for item in bpy.data.objects):
         raise nothing
+    if loss := lost(path):
+        print(f"arapfields: {loss}", file=sys.stderr, flush=True)
+
+
+def lost(path):
+    """A sentence on what single precision costs the coordinates of a mesh file; "" for too little."""
+    meshes = [mesh_arrays.positions(item.data) for item in bpy.data.objects if is_source(item)]
+    points = np.concatenate(meshes)
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    off = float(np.spacing(np.abs(points).max().astype(np.float32))) / 2
+    if off <= NOTICED * size:
+        return ""
+    return (
+        f"{path}: Blender's coordinates have single precision: points are off by up to {off:.3g} of a size "
+        f"of {size:.3g}; move the mesh near the origin, or use `arapfields` without Blender"
+    )
 
 
 def write(path, items):
@@ -113,8 +133,9 @@ def export(path, items):
     elif suffix == ".stl":
         bpy.ops.wm.stl_export(**where, apply_modifiers=False)
     else:
-        materials = any(item.data.materials for item in items)
-        further = {"apply_modifiers": False, "path_mode": "ABSOLUTE", "export_materials": materials}
+        further = {"apply_modifiers": False, "path_mode": "ABSOLUTE"}
+        further["export_materials"] = any(item.data.materials for item in items)
+        further["export_colors"] = any(item.data.color_attributes for item in items)
         bpy.ops.wm.obj_export(**where, **further)
 
 

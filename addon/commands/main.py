@@ -9,6 +9,7 @@ import sys
 
 from ..core.errors import UserError, as_user_error
 from ..core.runtime import native
+from ..core.runtime.streams import open_streams
 from .launch import Launch, end_with_parent
 from .parser import parse
 
@@ -18,6 +19,7 @@ def run(arguments, script=None):
 
     `script` is the Python file that Blender was started with; None for a command of Blender's own.
     """
+    open_streams()
     try:
         options = parse(arguments)
     except SystemExit as stop:

@@ -32,8 +32,8 @@ GaussianSplats make(const ArrayArgument& centers, const ArrayArgument& rotations
           "standard deviations above 0 are needed");
   splats.log_scales = widths.array().log().cast<float>();
   const Vector alpha = as_vector(opacities, "opacities");
-  require(alpha.allFinite() && (alpha.array() > 0.0).all() && (alpha.array() < 1.0).all(), "opacities",
-          "outside of (0, 1)", "numbers between 0 and 1 are needed");
+  require((alpha.array() >= 0.0).all() && (alpha.array() <= 1.0).all(), "opacities", "outside of [0, 1]",
+          "numbers from 0 to 1 are needed");
   splats.opacity_logits = (alpha.array() / (1.0 - alpha.array())).log().cast<float>();
   const py::array_t<double> colours = as_doubles(harmonics, "harmonics");
   require(colours.ndim() == 3 && colours.shape(2) == 3, "harmonics", "another shape", "(n, k, 3) is needed");
@@ -111,7 +111,7 @@ Gaussian splats: anisotropic Gaussians with opacity and view-dependent colour, i
 Arrays are float32 and new each time.)")
       .def(py::init(&make), "centers"_a, "rotations"_a, "scales"_a, "opacities"_a, "harmonics"_a, R"(
 centers (n, 3); rotations (n, 4), unit quaternions (w, x, y, z); scales (n, 3), standard deviations along their
-axes; opacities (n,) between 0 and 1; harmonics (n, k, 3), colours of k = 1, 4, 9 or 16 real spherical harmonics.
+axes; opacities (n,) from 0 to 1; harmonics (n, k, 3), colours of k = 1, 4, 9 or 16 real spherical harmonics.
 InvalidInput for other shapes and values.)")
       .def("__len__", &GaussianSplats::size)
       .def("__repr__",
@@ -132,7 +132,7 @@ InvalidInput for other shapes and values.)")
           [](const GaussianSplats& self) {
             return VectorF(1.0f / (1.0f + (-self.opacity_logits.array()).exp()));
           },
-          "(n,) between 0 and 1.")
+          "(n,) from 0 to 1.")
       .def_property_readonly(
           "harmonics",
           [](const GaussianSplats& self) {

@@ -133,6 +133,19 @@ void take(GaussianSplats& splats, Index i, const Eigen::RowVectorXf& numbers) {
   splats.rotations.row(i) = numbers.segment<4>(after + 4);
 }
 
+/// The logit of an opacity may be infinite: that of 1, opaque, or of 0, invisible.
+void require_usable(const std::string& path, Index splat, const Eigen::RowVectorXf& numbers,
+                    const std::vector<std::string>& wanted) {
+  if (numbers.allFinite()) return;
+  for (std::size_t k = 0; k < wanted.size(); ++k) {
+    const float number = numbers[static_cast<Index>(k)];
+    const bool is_opacity = wanted[k] == "opacity";
+    if (std::isnan(number) || (std::isinf(number) && !is_opacity))
+      refuse(path, "splat " + std::to_string(splat) + " has " + (std::isnan(number) ? "NaN" : "infinity") +
+                       " as " + wanted[k]);
+  }
+}
+
 GaussianSplats sized(const Header& header, Index harmonics, const std::vector<const Property*>& others) {
   GaussianSplats splats;
   splats.centers.resize(header.count, 3);
@@ -201,7 +214,7 @@ GaussianSplats load_splats(const std::string& path, const Progress& progress) {
       const char* row = rows.data() + static_cast<std::size_t>(i) * header.stride;
       for (std::size_t k = 0; k < offsets.size(); ++k)
         std::memcpy(&numbers[static_cast<Index>(k)], row + offsets[k], sizeof(float));
-      if (!numbers.allFinite()) refuse(path, "splat " + std::to_string(first + i) + " has NaN or infinity");
+      require_usable(path, first + i, numbers, wanted);
       take(splats, first + i, numbers);
       char* other = splats.other_values.data() + (first + i) * splats.other_values.cols();
       for (const Property* property : others) {

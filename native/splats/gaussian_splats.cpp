@@ -60,7 +60,8 @@ void GaussianSplats::validate() const {
   check("centers", size(), centers.allFinite());
   check("rotations", rotations.rows(), rotations.allFinite());
   check("scales", log_scales.rows(), log_scales.allFinite());
-  check("opacities", opacity_logits.rows(), opacity_logits.allFinite());
+  check("opacities", opacity_logits.rows(), true);
+  require(!opacity_logits.hasNaN(), "opacities", "NaN", "numbers are needed");
   check("harmonics", harmonics.rows(), harmonics.allFinite());
   check("other_values", other_values.rows(), true);
   require(rotations.cols() == 4, "rotations", "another shape", "(n, 4) quaternions are needed");

@@ -14,7 +14,7 @@ struct ARAPFIELDS_EXPORT GaussianSplats {
   PointsF centers;             ///< (n,3)
   RowMatrix<float> rotations;  ///< (n,4) unit quaternions (w, x, y, z); columns of the rotation are the axes
   PointsF log_scales;          ///< (n,3) logarithms of the standard deviations along the axes
-  VectorF opacity_logits;      ///< (n) log(a / (1 − a)) of the opacities a
+  VectorF opacity_logits;      ///< (n) log(a / (1 − a)) of the opacities a; infinite where a is 0 or 1
   RowMatrix<float> harmonics;  ///< (n, 3 k) colours of k = 1, 4, 9 or 16 real spherical harmonics
   std::string other_properties;  ///< declarations in a PLY file of what else each splat has
   RowMatrix<char> other_values;  ///< (n, bytes) of these
@@ -26,7 +26,7 @@ struct ARAPFIELDS_EXPORT GaussianSplats {
   void append_copies(const std::vector<Index>& rows);
   /// Becomes as many splats as these with their opacities and other values; the rest is not set.
   void be_places_of(const GaussianSplats& other);
-  /// Throws InvalidInput that names what has another number of rows, or is not finite.
+  /// Throws InvalidInput that names what has another number of rows, or numbers that it cannot have.
   void validate() const;
 };
 

@@ -14,6 +14,8 @@ import pytest
 from support.blender.inside import IN_BLENDER, require_bpy
 from support.geometry import meshes
 
+from arapfields.cli.meshes import formats
+
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
@@ -225,6 +227,46 @@ def test_what_cannot_be_read_is_one_line(command, tmp_path, name, content, text)
     done = command("stylize", "-i", tmp_path / name, "-o", tmp_path / "x.ply", check=False)
     said = [line for line in done.stderr.splitlines() if line.startswith("arapfields")]
     assert done.returncode == 2 and len(said) == 1 and text in said[0] and name in said[0]
+
+
+def test_an_obj_keeps_the_colours_of_its_vertices(script, tmp_path):
+    vertices, triangles = meshes.sphere(subdivisions=2)
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f} 0.8 0.4 {(z + 1) / 2:.4f}" for x, y, z in vertices]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in triangles]
+    (tmp_path / "scan.obj").write_text("\n".join(lines) + "\n")
+    for end in ("obj", "ply"):
+        script(
+            "stylize", "--style", "cube", "-i", tmp_path / "scan.obj", "-o", tmp_path / f"out.{end}", *QUICK
+        )
+        found = formats.read(tmp_path / f"out.{end}").colours
+        wanted = np.stack(
+            [np.full(len(vertices), 0.8), np.full(len(vertices), 0.4), (vertices[:, 2] + 1) / 2], 1
+        )
+        assert np.abs(found[:, :3] - wanted).max() < 0.005  # a byte, and its way through linear colours
+
+
+def test_what_single_precision_costs_far_coordinates_is_said(script, tmp_path):
+    vertices, triangles = meshes.sphere(subdivisions=2)
+    for name, place in (("near", [1.0, 2.0, 3.0]), ("far", [432150.25, 5210437.75, 310.5])):
+        lines = ["v " + " ".join(map(repr, row)) for row in (vertices + place).tolist()]
+        lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in triangles]
+        (tmp_path / f"{name}.obj").write_text("\n".join(lines) + "\n")
+        done = script(
+            "stylize", "--style", "cube", "-i", tmp_path / f"{name}.obj", "-o", tmp_path / "a.obj", *QUICK
+        )
+        said = [line for line in done.stderr.splitlines() if "single precision" in line]
+        assert [("off by up to 0.25 of a size of 3.46" in line) for line in said] == [True] * (name == "far")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell of other systems")
+def test_a_script_works_without_standard_error(user_folder, tmp_path):
+    write_ball(tmp_path / "ball.ply", level=2)
+    call = [sys.executable, str(ROOT / "blender_scripts/stylize.py"), "--style", "cube"]
+    call += ["-i", str(tmp_path / "ball.ply"), "-o", str(tmp_path / "out.ply"), *QUICK]
+    quoted = " ".join(f"'{word}'" for word in call)
+    done = subprocess.run(["sh", "-c", f"{quoted} 2>&-"], env=user_folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert formats.read(tmp_path / "out.ply").vertices.shape == read(tmp_path / "ball.ply")[0].shape
 
 
 def test_an_obj_keeps_its_polygons_materials_and_textures(script, tmp_path):

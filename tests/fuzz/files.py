@@ -5,8 +5,7 @@ import json
 from pathlib import Path
 
 import numpy as np
-import trimesh
-from support.files import archives
+from support.files import archives, odd_meshes
 
 import arapfields as af
 from addon.commands.children import read_objects
@@ -14,6 +13,7 @@ from addon.commands.record import Record, differences
 from arapfields.__main__ import main
 from arapfields.cli import files
 from arapfields.cli.handles import build_handles, read_handles
+from arapfields.cli.meshes import formats
 
 from . import mutate
 from .splats import GIVEN
@@ -79,26 +79,24 @@ class Sdfs(Archives):
 
 
 class Meshes(Target):
-    """Meshes: read, moved and written by the command line's functions."""
+    """Meshes: read, moved and written in their own format and in another by the command line's functions."""
 
     def make(self):
         examples = {}
-        box = trimesh.creation.box()
-        for suffix in ("ply", "off", "stl"):
-            box.export(self.folder / f"box.{suffix}")
-        box.export(self.folder / "text.ply", encoding="ascii")
-        (self.folder / "text.stl").write_text(trimesh.exchange.stl.export_stl_ascii(box))
-        lines = [f"v {x:.3f} {y:.3f} {z:.3f}" for x, y, z in box.vertices]
-        lines += ["mtllib none.mtl", "vt 0 0", "vn 0 0 1", "usemtl skin"]
-        lines += ["f " + " ".join(f"{i + 1}/1/1" for i in row) for row in box.faces]
-        (self.folder / "box.obj").write_text("\n".join(lines) + "\n")
-        for path in self.folder.glob("*.*"):
-            examples[path.name] = path
+        for name, (content, _) in odd_meshes.all_files().items():
+            examples[name] = self.folder / name
+            examples[name].write_bytes(content)
         return examples
 
     def use(self, path):
-        mesh = files.read_mesh(path)
-        files.write_moved_mesh(self.folder / f"moved{path.suffix}", path, mesh, lambda points: points + 1.0)
+        mesh = files.read_any(path)
+        move = mesh.vertices + 1.0
+        formats.write_moved(self.folder / f"moved{path.suffix}", path.suffix, mesh, move)
+        other = {".obj": ".ply", ".ply": ".off", ".off": ".stl", ".stl": ".obj"}[path.suffix]
+        formats.write_moved(self.folder / f"other{other}", path.suffix, mesh, move)
+        again = formats.read(self.folder / f"moved{path.suffix}")
+        assert np.array_equal(again.sizes, mesh.sizes) or path.suffix == ".stl"  # more corners may be equal
+        files.read_surface(path)
 
 
 class Splats(Target):
@@ -200,7 +198,7 @@ class CommandLine(Target):
 
     def make(self):
         self.parts = [kind(self.sub(kind.__name__)) for kind in (Fields, Sdfs, Meshes, Handles)]
-        (self.folder / "mesh.obj").write_bytes((self.folder / "Meshes" / "box.obj").read_bytes())
+        (self.folder / "mesh.obj").write_bytes((self.folder / "Meshes" / "texture.obj").read_bytes())
         return {"mesh": self.folder / "mesh.obj"}
 
     def sub(self, name):

@@ -29,11 +29,33 @@ def test_a_file_comes_back_and_keeps_what_it_has_besides(tmp_path):
     )
 
 
+def test_opaque_and_invisible_splats_stay_so(tmp_path):
+    """An exporter writes the logit of an opacity of 1 as infinity."""
+    splats(5, 4).save(tmp_path / "a.ply")
+    good = (tmp_path / "a.ply").read_bytes()
+    row = len(good.split(b"end_header\n")[1]) // 5
+    for value, opacity in ((np.inf, 1.0), (-np.inf, 0.0)):
+        at = len(good) - row - 32  # of the opacity of the last splat but one
+        content = good[:at] + np.array([value], "<f4").tobytes() + good[at + 4 :]
+        (tmp_path / "b.ply").write_bytes(content)
+        scan = af.GaussianSplats.load(tmp_path / "b.ply")
+        assert scan.opacities[3] == opacity and 0 < scan.opacities[4] < 1
+        scan.save(tmp_path / "c.ply")
+        assert (tmp_path / "c.ply").read_bytes() == content
+        again = af.GaussianSplats(scan.centers, scan.rotations, scan.scales, scan.opacities, scan.harmonics)
+        assert again.opacities[3] == opacity
+        samples = af.sample_mesh(
+            [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], 200
+        )
+        field = af.deform(samples, [af.PointHandle([0, 0, 0], [0.1, 0, 0])], af.DeformOptions(iterations=3))
+        assert field.apply_to(scan).opacities[3] == opacity
+
+
 def test_what_cannot_be_read_is_named(tmp_path):
     splats(5, 4).save(tmp_path / "a.ply")
     good = (tmp_path / "a.ply").read_bytes()
     bad = tmp_path / "bad.ply"
-    nan = np.array([np.nan], "<f4").tobytes()
+    nan, inf = (np.array([value], "<f4").tobytes() for value in (np.nan, -np.inf))
     for content, word in (
         (good[:10], "no PLY"),
         (good[:-3], "cut off"),
@@ -44,7 +66,9 @@ def test_what_cannot_be_read_is_named(tmp_path):
         (good.replace(b"property float rot_1", b"property blob rot_1"), "unknown"),
         (good.replace(b"float f_rest_3", b"float f_rest_2"), "lacks properties"),
         (good.replace(b"end_header", b"element face 3\nend_header"), "elements face"),
-        (good[:-4] + nan, "splat 4 has NaN"),
+        (good[:-4] + nan, "splat 4 has NaN as rot_3"),
+        (good[:-20] + inf + good[-16:], "splat 4 has infinity as scale_2"),
+        (good[:-32] + nan + good[-28:], "splat 4 has NaN as opacity"),
         (good[:-16] + bytes(16), "rotation of splat 4 is zero"),
     ):
         bad.write_bytes(content)

@@ -5,6 +5,7 @@ import errno
 import sys
 
 from ._native import Cancelled, Diverged, InvalidInput
+from ._streams import open_streams, say
 from .cli.parser import parse
 
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # not errors of the input
@@ -13,6 +14,7 @@ DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # not errors of the
 def main(arguments=None):
     """Runs a verb and returns the exit code; errors are printed as one line on stderr."""
     verb = "arapfields"
+    open_streams()
     try:
         options = parse(sys.argv[1:] if arguments is None else arguments)
         verb = f"arapfields {options.verb}"
@@ -32,7 +34,7 @@ def main(arguments=None):
 
 
 def _fail(verb, reason, code):
-    print(f"{verb}: {' '.join(str(reason).split())}", file=sys.stderr)
+    say(f"{verb}: {' '.join(str(reason).split())}")
     return code
 
 

@@ -45,11 +45,16 @@ def naming(output, path):
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
-def read_text(path, errors="strict"):
-    """The text of a file in UTF-8, with or without a byte order mark, or in UTF-16 with one."""
+def read_text(path, errors="strict", newline=None):
+    """The text of a file in UTF-8, with or without a byte order mark, or in UTF-16 with one.
+
+    Line ends become "\n", or stay with `newline=""`.
+    """
     with open(path, "rb") as file:
         is_wide = file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-    return Path(path).read_text(encoding="utf-16" if is_wide else "utf-8-sig", errors=errors)
+    encoding = "utf-16" if is_wide else "utf-8-sig"
+    with open(path, encoding=encoding, errors=errors, newline=newline) as file:
+        return file.read()
 
 
 def write_text(path, text):

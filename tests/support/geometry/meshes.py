@@ -75,7 +75,7 @@ def check_closed(V, F):
 
 
 def read(path):
-    """Vertices and triangles of an OBJ or OFF file; polygons become triangle fans."""
+    """Vertices and triangles of an OBJ or OFF file; polygons lose one ear after the other."""
     path = Path(path)
     lines = [line.split() for line in path.read_text().splitlines() if line.strip() and line[0] != "#"]
     if path.suffix == ".off":
@@ -86,9 +86,42 @@ def read(path):
         ]
     else:
         vertices = [row[1:4] for row in lines if row[0] == "v"]
-        polygons = [[int(i.split("/")[0]) - 1 for i in row[1:]] for row in lines if row[0] == "f"]
-    triangles = [(p[0], p[k], p[k + 1]) for p in polygons for k in range(1, len(p) - 1)]
-    return np.array(vertices, float), np.array(triangles)
+        polygons, given = [], 0
+        for row in lines:
+            given += row[0] == "v"
+            if row[0] == "f":
+                indices = [int(word.split("/")[0]) for word in row[1:]]
+                polygons.append([i - 1 if i > 0 else given + i for i in indices])
+    vertices = np.array(vertices, float)
+    triangles = [[p[i] for i in ear] for p in polygons for ear in ears(vertices[p])]
+    return vertices, np.array(triangles)
+
+
+def ears(outline):
+    """Triangles of a polygon (k, 3) in space, as indices of its corners: its ears, one after the other."""
+    ring = list(range(len(outline)))
+    if len(ring) == 3:
+        return [ring]
+    shape = outline - outline[0]
+    normal = np.cross(shape, np.roll(shape, -1, axis=0)).sum(axis=0)
+    found = []
+    while len(ring) > 3:
+        turns = [(ring[k - 1], ring[k], ring[(k + 1) % len(ring)]) for k in range(len(ring))]
+        ear = next((turn for turn in turns if is_ear(shape, turn, ring, normal)), turns[0])
+        found.append(ear)
+        ring.remove(ear[1])
+    return [*found, tuple(ring)]
+
+
+def is_ear(points, turn, ring, normal):
+    """Whether a corner of a polygon turns inwards, with none of the other corners in its triangle."""
+    corners = points[list(turn)]
+    sides = np.roll(corners, -1, axis=0) - corners
+    if np.cross(sides[0], sides[1]) @ normal <= 0:
+        return False
+    others = points[[i for i in ring if i not in turn]]
+    within = np.cross(sides[None], others[:, None] - corners[None]) @ normal >= 0
+    return not within.all(axis=1).any()
 
 
 @functools.cache

@@ -11,6 +11,7 @@ import arapfields as af
 from .._files import whole_file
 from .._point_cache_layout import SUFFIXES as CACHES
 from .._point_cache_layout import Layout
+from .._streams import say
 from ..point_cache import PointCacheWriter
 from . import files, usd
 from .frame_solver import FrameSolver, frames_wanted
@@ -35,6 +36,7 @@ def animate(args):
     tracks = read_tracks(args.tracks)
     wanted = frames_wanted(args, tracks)
     vertices, triangles = files.read_mesh(args.input)
+    files.tell_loss(output, vertices)
     solver = FrameSolver(af.sample_mesh(vertices, triangles, seed=options.seed), tracks, options, args)
     solver.check(wanted)
     whole = solver.description(wanted[0]) + vertices.tobytes() + triangles.tobytes()
@@ -47,7 +49,7 @@ def animate(args):
         else:
             text = f"another animate is at work on the same frames, and makes {output}"
     if not args.quiet:
-        print(text)
+        say(text, "stdout")
 
 
 def _run(args, solver, store, tracks, places, mesh):
@@ -89,7 +91,7 @@ def _solve(solver, vertices, store, places, mine, task, args):
             store.put(place, solver.field(index, task)(vertices))
         if not args.quiet and not sys.stderr.isatty() and time.monotonic() - said > LINES:
             said = time.monotonic()
-            print(f"{name}: {done + 1} of {len(mine)} solved", file=sys.stderr, flush=True)
+            say(f"{name}: {done + 1} of {len(mine)} solved")
 
 
 def _write(output, frames, shape, fps, start, task, args):

@@ -1,35 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads and writes meshes, point clouds, normals, SDFs and fields. Errors name the file."""
 
-import codecs
 import contextlib
-import io
-import logging
-import re
 from pathlib import Path
 
 import numpy as np
 
 from .. import _native
 from .._files import existing_file, read_text, write_arrays
-from .._interrupts import uninterrupted
 from .._native import InvalidInput, ObjectStyle
+from .._streams import say
+from .meshes import formats
+from .meshes.mesh import Mesh
 
-MESH_SUFFIXES = (".ply", ".obj", ".stl", ".off")
+MESH_SUFFIXES = tuple(formats.FORMATS)
 CLOUD_SUFFIXES = (".ply", ".npz", ".xyz")
 STATE_SUFFIXES = (".safetensors",)
-OBJ_VERTEX = re.compile(r"^([ \t]*v[ \t]+)(\S+)[ \t]+(\S+)[ \t]+(\S+)", flags=re.M)
 MOST_PREFERRED = 256  # largest number of preferred normals from a mesh's faces
-
-
-def _trimesh():
-    try:
-        with uninterrupted():  # some of its modules catch Ctrl-C during import
-            import trimesh
-    except ImportError:
-        raise ImportError("meshes need the package trimesh: pip install 'arapfields[cli]'") from None
-    logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # our errors contain what matters
-    return trimesh
 
 
 @contextlib.contextmanager
@@ -37,7 +24,7 @@ def readable(path, kind):
     """Context manager: errors of readers on damaged files become InvalidInput that names the file."""
     try:
         yield
-    except (InvalidInput, MemoryError):
+    except (InvalidInput, MemoryError, ImportError):
         raise
     except OSError as error:
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
@@ -51,93 +38,58 @@ def is_mesh(path):
 
 
 def read_mesh(path):
-    """Vertices (n, 3) and triangles (m, 3) of a file; polygons are triangulated.
+    """Vertices (n, 3) and triangles (m, 3) of a file; see read_surface."""
+    return read_surface(path).surface
 
-    The vertices' order is the file's; equal corners of an STL are merged.
+
+def read_surface(path):
+    """The Mesh of a file that has polygons with an area.
+
+    The vertices and their order are the file's; equal corners of an STL are one vertex.
     """
     path = existing_file(path, MESH_SUFFIXES)
-    trimesh = _trimesh()
-    with readable(path, path.suffix[1:].upper()):
-        mesh = trimesh.load(
-            _stream(path),
-            file_type=path.suffix[1:].lower(),
-            force="mesh",
-            process=False,
-            maintain_order=True,
-            skip_materials=True,
-        )
-        vertices, triangles = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
-    for name, rows in (("vertices", vertices), ("faces", triangles)):
-        if len(rows) and (rows.ndim != 2 or rows.shape[1] != 3):
-            raise InvalidInput(
-                f"{path}: {name} are rows of shape {rows.shape[1:]}; three numbers each are needed"
-            )
-    if triangles.size == 0:
+    mesh = read_any(path)
+    if len(mesh.triangles) == 0:
         raise InvalidInput(f"{path}: has no faces (or is cut off); a triangle mesh is needed")
-    fits = (np.abs(vertices) <= np.finfo(np.float32).max).all(axis=1)  # files have single precision
-    if not fits.all():
-        first = int(np.flatnonzero(~fits)[0])
-        raise InvalidInput(f"{path}: vertex {first} is NaN, infinite or beyond single precision")
-    if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise InvalidInput(f"{path}: a face names a vertex beyond the {len(vertices)} there are")
-    corners = vertices[triangles]
+    corners = mesh.vertices[mesh.triangles]
     if not np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any():
         raise InvalidInput(f"{path}: all faces are degenerate; there is no surface")
-    if path.suffix.lower() == ".stl":
-        vertices, triangles = _merged(vertices, triangles)
-    return vertices, triangles.astype(np.int32)
+    return mesh
 
 
-def _stream(path):
-    """The path, or a stream of the text without its byte order mark, which trimesh misreads."""
-    with path.open("rb") as file:
-        is_marked = file.read(3).startswith((codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    is_text = path.suffix.lower() in (".obj", ".off")
-    return io.BytesIO(read_text(path, "replace").encode()) if is_marked and is_text else path
-
-
-def _merged(vertices, triangles):
-    unique, inverse = np.unique(vertices, axis=0, return_inverse=True)
-    return unique, inverse.reshape(-1)[triangles]
+def read_any(path):
+    """The Mesh of a file, which may have points or curves alone."""
+    with readable(path, path.suffix[1:].upper()):
+        return formats.read(path)
 
 
 def write_mesh(path, vertices, triangles):
     """Writes PLY, OBJ, STL or OFF by the path's extension."""
-    mesh = _trimesh().Trimesh(vertices, triangles, process=False)
-    mesh.export(path)
+    triangles = np.asarray(triangles, np.int64)
+    sizes = np.full(len(triangles), 3)
+    _tell(formats.write(path, Mesh(np.asarray(vertices, float), sizes, triangles.reshape(-1))))
 
 
 def write_moved_mesh(path, source, mesh, move):
-    """Writes the mesh of the file `source` with its vertices moved by `move`, points (n, 3) → (n, 3).
+    """Writes the Mesh of the file `source` with its vertices moved by `move`, points (n, 3) → (n, 3).
 
-    From OBJ to OBJ, polygons, texture coordinates, materials and groups are kept; normals are removed, as
-    they are those of the old shape. Otherwise only positions and triangles are written.
+    In the source's format all else is kept, but for normals, as they are those of the old shape. In others
+    polygons, colours and texture coordinates are kept where the format has a place for them.
     """
-    if path.suffix.lower() == Path(source).suffix.lower() == ".obj":
-        moved = moved_obj(source, move)
-        if moved is not None:
-            path.write_text(moved, encoding="utf-8", newline="\n", errors="surrogateescape")
-            return
-    vertices, triangles = mesh
-    write_mesh(path, move(vertices), triangles)
+    moved = np.asarray(move(mesh.vertices), float)
+    _tell(formats.write_moved(path, Path(source).suffix, mesh, moved))
 
 
-def moved_obj(source, move):
-    """The text of an OBJ file with its vertices moved; None if one is not finite."""
-    text = read_text(source, "surrogateescape")
-    text = re.sub(r"\\\r?\n", "", text)  # continued lines
-    with readable(source, "OBJ"):
-        before = np.array([[float(c) for c in m.groups()[1:]] for m in OBJ_VERTEX.finditer(text)])
-    if not np.isfinite(before).all():
-        return None
-    rows = iter(move(before.reshape(-1, 3)))
-    moved = OBJ_VERTEX.sub(lambda m: m[1] + " ".join(f"{c:.9g}" for c in next(rows)), text)
-    moved = re.sub(r"^[ \t]*vn[ \t].*\n?", "", moved, flags=re.M)
-    return re.sub(r"^[ \t]*f[ \t].*$", _without_normals, moved, flags=re.M)
+def tell_loss(path, points):
+    """Says what positions like these lose in a format of single precision."""
+    if loss := formats.lost(points):
+        _tell(f"{path.name}: {loss}")
 
 
-def _without_normals(line):
-    return re.sub(r"(\d+)/(-?\d*)/-?\d+", lambda m: f"{m[1]}/{m[2]}".rstrip("/"), line[0])
+def _tell(loss):
+    """Prints what a file has lost; `--quiet` does not hide it."""
+    if loss:
+        say(f"note: {loss}")
 
 
 def write_cloud(path, points, normals):
@@ -148,7 +100,7 @@ def write_cloud(path, points, normals):
         return
     rows = np.ascontiguousarray(np.hstack([points, normals]))
     if suffix == ".xyz":
-        np.savetxt(path, rows, fmt="%.9g")
+        np.savetxt(path, rows, fmt="%.17g")
         return
     properties = "".join(f"property double {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}end_header\n"

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import argparse
-import sys
+
+from .._streams import say
 
 
 class OneLineParser(argparse.ArgumentParser):
     """An ArgumentParser that prints errors in one line, with exit code 2, and names the verb's help."""
 
     def error(self, message):
-        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
+        say(f"{self.prog}: {message} (see {self.prog} --help)")
         raise SystemExit(2)
 
     def parse_known_args(self, args=None, namespace=None):

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Point sets and curves to be moved by a field, and weights of a mesh's vertices."""
 
-import re
-
 import numpy as np
 
 from .._files import existing_file, read_text, write_arrays
 from .._native import InvalidInput
-from .files import MESH_SUFFIXES, OBJ_VERTEX, _trimesh, moved_obj, read_mesh, readable, write_moved_mesh
+from .files import MESH_SUFFIXES, read_any, readable, write_moved_mesh
 
 TEXT_SUFFIXES = (".xyz", ".txt", ".csv")
 ARRAY_SUFFIXES = (".npy", ".npz")
@@ -17,58 +15,35 @@ WARPED = (*MESH_SUFFIXES, *TEXT_SUFFIXES, *ARRAY_SUFFIXES)
 def warped(source):
     """A function write(path, move) that writes the moved points of `source` to a path.
 
-    For meshes and OBJ curves the rest of the file is kept; point sets are rows x y z.
+    For meshes, curves and points of mesh files the rest of the file is kept; point sets are rows x y z.
     """
     source = existing_file(source, WARPED)
     suffix = source.suffix.lower()
-    points = None
-    if suffix in MESH_SUFFIXES:
-        if suffix == ".obj" and not _has_faces(source):
-            return lambda path, move: _write_obj(path, source, move)
-        if suffix == ".ply":
-            points = _ply_cloud(source)
-        if points is None:
-            mesh = read_mesh(source)
-            return lambda path, move: write_moved_mesh(
-                _with(path, MESH_SUFFIXES, "a mesh"), source, mesh, move
-            )
-    else:
+    if suffix not in MESH_SUFFIXES:
         points = _rows(source)
-    if len(points) == 0 or not np.isfinite(points).all():
-        raise InvalidInput(f"{source}: has no points, or NaN or infinite ones; finite points are needed")
-    return lambda path, move: _write_points(path, move(points))
+        if len(points) == 0 or not np.isfinite(points).all():
+            raise InvalidInput(f"{source}: has no points, or NaN or infinite ones; finite points are needed")
+        return lambda path, move: _write_points(path, move(points))
+    mesh = read_any(source)
+    if len(mesh.vertices) == 0:
+        raise InvalidInput(f"{source}: has no vertices; points, curves or a mesh are needed")
+    is_surface = len(mesh.triangles) > 0
+
+    def write(path, move):
+        if is_surface or path.suffix.lower() == suffix:
+            write_moved_mesh(_with(path, MESH_SUFFIXES, "a mesh"), source, mesh, move)
+        elif suffix == ".obj":
+            _with(path, (".obj",), "curves")
+        else:
+            _write_points(path, move(mesh.vertices))
+
+    return write
 
 
 def _with(path, suffixes, what):
     if path.suffix.lower() not in suffixes:
         raise InvalidInput(f"--output: {path.name} is no place for {what}; use {', '.join(suffixes)}")
     return path
-
-
-def _has_faces(path):
-    with readable(path, "OBJ"):
-        return re.search(r"^[ \t]*f ", read_text(path, "surrogateescape"), flags=re.M) is not None
-
-
-def _write_obj(path, source, move):
-    """Writes the moved lines, curves and points of an OBJ file without faces."""
-    text = read_text(source, "surrogateescape")
-    if not OBJ_VERTEX.search(text):
-        raise InvalidInput(f"{source}: has no vertices; points, curves or a mesh are needed")
-    moved = moved_obj(source, move)
-    if moved is None:
-        raise InvalidInput(f"{source}: a vertex is NaN or infinite; coordinates must be finite")
-    _with(path, (".obj",), "curves").write_text(
-        moved, encoding="utf-8", newline="\n", errors="surrogateescape"
-    )
-
-
-def _ply_cloud(path):
-    """Points (n, 3) of a PLY file without faces; None for a mesh."""
-    trimesh = _trimesh()
-    with readable(path, "PLY"):
-        loaded = trimesh.load(path, process=False)
-        return np.array(loaded.vertices, float) if isinstance(loaded, trimesh.PointCloud) else None
 
 
 def _rows(path):
@@ -98,7 +73,7 @@ def _write_points(path, points):
         with path.open("wb") as file:
             np.save(file, points)
     elif suffix in TEXT_SUFFIXES:
-        np.savetxt(path, points, fmt="%.9g", delimiter="," if suffix == ".csv" else " ")
+        np.savetxt(path, points, fmt="%.17g", delimiter="," if suffix == ".csv" else " ")
     else:
         _with(path, (".ply",), "points")
         header = "".join(f"property double {name}\n" for name in "xyz")

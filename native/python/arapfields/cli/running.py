@@ -8,6 +8,7 @@ from pathlib import Path
 
 from .._files import naming
 from .._native import InvalidInput, OutputFile, Task
+from .._streams import swallow
 
 POLL = 0.1  # seconds between reads of a task's progress
 
@@ -50,8 +51,7 @@ def with_progress(label, call, quiet=False):
         finished.wait()
         raise
     finally:
-        if bar is not None:
-            bar.close()
+        _with(bar, lambda: bar.close())
     if "error" in outcome:
         raise outcome["error"]
     return outcome["result"]
@@ -69,10 +69,21 @@ def _bar(label, quiet):
 
 
 def _show(bar, progress, message):
-    if bar is not None:
+    def draw():
         bar.set_postfix_str(message, refresh=False)
         bar.update(progress - bar.n)
         bar.refresh()
+
+    _with(bar, draw)
+
+
+def _with(bar, draw):
+    """Draws a bar, if there is one and its terminal is still there."""
+    if bar is not None:
+        try:
+            draw()
+        except (OSError, ValueError):
+            swallow(sys.stderr)
 
 
 class Outputs:

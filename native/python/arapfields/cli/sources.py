@@ -17,7 +17,7 @@ class Source:
         self._args = args
         self.path = existing_file(args.input, SOURCES)
         self.splats = af.GaussianSplats.load(self.path) if af.GaussianSplats.is_file(self.path) else None
-        self.mesh = files.read_mesh(self.path) if files.is_mesh(self.path) and not self.splats else None
+        self.mesh = files.read_surface(self.path) if files.is_mesh(self.path) and not self.splats else None
         self._sdf = None if self.mesh or self.splats else files.read_sdf(self.path)
 
     def sdf(self):
@@ -25,11 +25,11 @@ class Source:
             raise af.InvalidInput(f"{self.path}: holds splats; a mesh or a signed distance is needed")
         if self._sdf is None:
             exact = self._args.sdf == "exact"
-            self._sdf = self.distances() if exact else fitted(*self.mesh, af.FitOptions(), self._args)
+            self._sdf = self.distances() if exact else fitted(*self.mesh.surface, af.FitOptions(), self._args)
         return self._sdf
 
     def distances(self):
-        return af.MeshSdf(*self.mesh) if self.mesh else self._sdf
+        return af.MeshSdf(*self.mesh.surface) if self.mesh else self._sdf
 
     def write_moved(self, path, field):
         """Writes the mesh or splats moved by a field."""
@@ -46,9 +46,9 @@ def fitted(vertices, triangles, options, args):
 def samples(source, count, seed, args):
     painted = {name: getattr(args, name) for name in ("weights", "bend_weights") if getattr(args, name, None)}
     if source.mesh:
-        count_of = len(source.mesh[0])
+        count_of = len(source.mesh.vertices)
         weights = {name: points.read_weights(path, count_of) for name, path in painted.items()}
-        return af.sample_mesh(*source.mesh, count, seed=seed, **weights)
+        return af.sample_mesh(*source.mesh.surface, count, seed=seed, **weights)
     if painted:
         flag = "--" + next(iter(painted)).replace("_", "-")
         raise af.InvalidInput(

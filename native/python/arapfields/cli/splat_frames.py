@@ -8,6 +8,7 @@ from pathlib import Path
 
 import arapfields as af
 
+from .._streams import say
 from .frame_solver import FrameSolver, frames_wanted
 from .options import given_options
 from .running import Outputs, with_progress
@@ -42,4 +43,5 @@ def animate_splats(args):
 
     with_progress("animate", solve, args.quiet)
     if not args.quiet:
-        print(f"{len(mine)} frames solved; wrote {places[0]} to {places[-1].name}" if mine else "no frames")
+        text = f"{len(mine)} frames solved; wrote {places[0]} to {places[-1].name}" if mine else "no frames"
+        say(text, "stdout")

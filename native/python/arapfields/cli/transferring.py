@@ -48,16 +48,17 @@ def run(args):
     require_pairs(args)
     with Outputs() as outputs:
         keys, arrays = output_places(args, outputs)
-        meshes = files.read_mesh(args.source), files.read_mesh(args.target)
+        shapes = files.read_surface(args.source), files.read_surface(args.target)
+        meshes = shapes[0].surface, shapes[1].surface
         field = files.read_mesh(args.field)[0] if files.is_mesh(args.field) else files.read_field(args.field)
         places = with_progress(
             "transfer",
             lambda task: af.Correspondence(field, *meshes, back=args.back, task=task),
             args.quiet,
         )
-        giving, receiving = reversed(meshes) if args.back else meshes
+        giving, receiving = reversed(shapes) if args.back else shapes
         for key, output in keys.items():
-            offsets = places.displacements(shape_of(key, giving) - giving[0])
+            offsets = places.displacements(shape_of(key, giving) - giving.vertices)
             write_key(outputs, output, receiver(args), receiving, offsets)
         if args.values:
             carried = {name: places.values(array) for name, array in read_values(args.values).items()}
@@ -103,13 +104,9 @@ def output_places(args, outputs):
 
 def write_key(outputs, place, path, mesh, offsets):
     """Writes the mesh of a file with its vertices moved."""
-
-    def moved(rest):
-        if len(rest) != len(mesh[0]):
-            raise af.InvalidInput(f"{len(rest)} vertices are to be written, and {len(mesh[0])} were read")
-        return rest + offsets
-
-    outputs.write(place, lambda output: files.write_moved_mesh(output, path, mesh, moved))
+    outputs.write(
+        place, lambda output: files.write_moved_mesh(output, path, mesh, lambda rest: rest + offsets)
+    )
 
 
 def write_named(outputs, place, arrays):
@@ -122,10 +119,10 @@ def write_named(outputs, place, arrays):
 
 
 def shape_of(path, giving):
-    """(n, 3) vertices of the mesh `giving` in another shape, from a file."""
+    """(n, 3) vertices of the Mesh `giving` in another shape, from a file."""
     vertices = files.read_mesh(path)[0]
-    if len(vertices) != len(giving[0]):
-        raise af.InvalidInput(f"{path}: {len(vertices)} vertices; the mesh has {len(giving[0])}")
+    if len(vertices) != len(giving.vertices):
+        raise af.InvalidInput(f"{path}: {len(vertices)} vertices; the mesh has {len(giving.vertices)}")
     return vertices
 
 

@@ -2,7 +2,6 @@
 """The functions of the verbs: read, check the outputs' paths, compute, write."""
 
 import argparse
-import sys
 
 import numpy as np
 
@@ -10,6 +9,7 @@ import arapfields as af
 
 from .. import grids
 from .._files import json_text
+from .._streams import say
 from . import files, points
 from .handles import build_handles, read_handles, rotation, triple, turn_upright
 from .options import given, given_options
@@ -202,7 +202,7 @@ def write_report(outputs, place, report):
 
 def _print_notes(args, report):
     for note in () if args.quiet else getattr(report, "notes", ()):
-        print(f"note: {note}", file=sys.stderr)
+        say(f"note: {note}")
 
 
 def summary(args, text, report=None):
@@ -216,4 +216,4 @@ def summary(args, text, report=None):
     }
     if numbers:
         text += "; " + ", ".join(f"{name.replace('_', ' ')} {value:.4g}" for name, value in numbers.items())
-    print(text, file=sys.stdout)
+    say(text, "stdout")

@@ -7,6 +7,7 @@ from pathlib import Path
 import arapfields as af
 
 from .._files import existing_file, json_text
+from .._streams import say
 from . import contact_sheet, files, sources
 from .options import given
 from .running import Outputs, with_progress
@@ -38,7 +39,7 @@ def run(args, options):
     if not args.quiet:
         for name in sorted(done, key=lambda name: -off(done[name])):
             notes = "; ".join(done[name]["notes"])
-            print(f"{name}: {off(done[name]):.2%} of the target's size off{notes and '; ' + notes}")
+            say(f"{name}: {off(done[name]):.2%} of the target's size off{notes and '; ' + notes}", "stdout")
     if done:
         write_sheet(output, everything, template.suffix.lower())
     refuse(failed, len(done) + len(failed))
@@ -116,7 +117,7 @@ def wrap_one(place, mark, target, source, samples, options, args):
         field = with_progress(
             place.stem, lambda task: af.wrap(samples, function, [], options, task=task), args.quiet
         )
-        outputs.write(place, lambda path: files.write_moved_mesh(path, source.path, source.mesh, field))
+        outputs.write(place, lambda path: source.write_moved(path, field))
         report = {**field.report.to_dict(), "made_with": mark.hexdigest()}
         outputs.write(
             place.with_suffix(".json"),

@@ -7,8 +7,9 @@ from pathlib import Path
 import arapfields as af
 
 from .._point_cache_layout import SUFFIXES as CACHES
+from .._streams import say
 from ..point_cache import PointCacheWriter
-from . import sources, wrap_folder
+from . import files, sources, wrap_folder
 from .frames import FrameStore
 from .options import given
 from .running import Outputs, with_progress
@@ -47,7 +48,8 @@ def run(args, options, pairs):
     paths, source = frames_of(args.target), sources.Source(args)
     if source.mesh is None:
         raise af.InvalidInput(f"{source.path}: holds no mesh to move")
-    vertices = source.mesh[0]
+    vertices = source.mesh.vertices
+    files.tell_loss(output, vertices)
     samples = sources.samples(source, given(args, "wrap", "samples"), options.seed, args)
     store = FrameStore(output, len(vertices), made_of(samples, options).digest())
     with store.only_run("sequence", [store.place(0, [])]) as first:
@@ -82,7 +84,8 @@ def write(output, frames, paths, pairs, vertices, quiet):
     if not quiet:
         there = f", {frames.found} there already" if frames.found else ""
         off, name = worst
-        print(
+        text = (
             f"wrote {output}: {len(paths)} frames{there}, {off:.2%} of the target's size off at most ({name})"
         )
+        say(text, "stdout")
     return failed

@@ -104,7 +104,7 @@ def run_one(args, options):
             )
             verbs.write_report(outputs, report, field.report)
         if place := places.get("--output"):
-            outputs.write(place, lambda path: files.write_moved_mesh(path, source.path, source.mesh, field))
+            outputs.write(place, lambda path: source.write_moved(path, field))
         if place := places.get("--save-field"):
             outputs.write(place, field.save)
     written = "wrote " + ", ".join(str(path) for path in places.values())
@@ -165,4 +165,5 @@ def write_landmarks(path, suffix, pairs):
         if suffix.lower() == ".npy":
             np.save(file, pairs)
         else:
-            np.savetxt(file, pairs.reshape(-1, 6), delimiter="," if suffix.lower() == ".csv" else " ")
+            delimiter = "," if suffix.lower() == ".csv" else " "
+            np.savetxt(file, pairs.reshape(-1, 6), fmt="%.17g", delimiter=delimiter)
