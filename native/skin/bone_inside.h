@@ -28,8 +28,8 @@ struct BoneSurroundings {
 };
 
 /// The parts of a bone inside of the surfaces that contain it. A bone reaches to its tail and to the heads of
-/// its children. One whose tail is outside, as importers
-/// of joints place them, ends at the children instead, or without any where it leaves the shape.
+/// its children. One whose tail is outside, as importers of joints place them, ends at the children instead,
+/// or without any where it leaves the shape.
 class BoneInside {
  public:
   BoneInside(const Skeleton& skeleton, Index bone, const BoneSurroundings& around);

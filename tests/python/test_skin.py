@@ -222,10 +222,7 @@ def test_of_bones_in_one_place_the_joined_one_has_the_weights(legs, weights):
     before = [af.Bone(shin.head, shin.tail, None), *moved]
     assert af.coincident_bones(before) == [(0, 3)]
     assert np.array_equal(af.skin_weights(legs, before, FEW), np.pad(weights, ((0, 0), (1, 0))))
-    samples = af.sample_mesh(*legs, 500)
-    handles = af.bone_handles(samples, after)
-    assert len(handles) == 8
-    assert all(np.array_equal(handles[i].rest, handles[j].rest) for i, j in ((5, 1), (6, 2), (7, 2)))
+    assert len(af.bone_handles(af.sample_mesh(*legs, 500), after)) == 8  # one of each
 
 
 def test_bad_shapes_are_named_and_a_cancel_ends_it(legs):
