@@ -24,7 +24,8 @@ struct BoneSurroundings {
   const std::vector<Index>& slots;
   Index count;
   double spacing;
-  Vec3 low, high;  ///< corners of the box
+  Vec3 low;   ///< corner of the box
+  Vec3 high;  ///< the opposite corner
 };
 
 /// The parts of a bone inside of the surfaces that contain it. A bone reaches to its tail and to the heads of

@@ -30,7 +30,8 @@ ARAPFIELDS_EXPORT Mat4 bone_box(const Bone& bone);
 
 /// A straight part of a bone.
 struct BonePart {
-  Vec3 start, end;
+  Vec3 start;
+  Vec3 end;
 };
 
 /// The deforming bones that lie where another does, as control bones do, and the one that they lie at. This
