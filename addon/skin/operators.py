@@ -110,10 +110,23 @@ class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
                         )
                 elif correctives:
                     writing.add_correctives(item, armature, shape, rows, correctives, names)
-            used = np.count_nonzero(sum(np.asarray(own).max(axis=0) > 0 for own in weights))
-            return translated("{count} bones move {meshes}", count=used, meshes=names_of(items))
+            moves = np.any([np.asarray(own).max(axis=0) > 0 for own in weights], axis=0)
+            self.name_idle(bones, moves, af.coincident_bones(bones))
+            return translated("{count} bones move {meshes}", count=int(moves.sum()), meshes=names_of(items))
 
         return Item(rig.name, work, apply, edits=(reference, *(shape.reference for shape in read)))
+
+    def name_idle(self, bones, moves, coincident):
+        """Warns of the deforming bones without weights."""
+        passed = [bones[index].name for index, _ in coincident if not moves[index]]
+        idle = [bone.name for bone, used in zip(bones, moves, strict=True) if bone.deform and not used]
+        outside = [name for name in idle if name not in passed]
+        if passed:
+            self.warnings.append(
+                translated("Passed over, since others lie there: {bones}", bones=", ".join(passed))
+            )
+        if outside:
+            self.warnings.append(translated("No vertex follows {bones}", bones=", ".join(outside)))
 
 
 def names_of(items):

@@ -90,8 +90,16 @@ Weights (n, bones) for linear blend skinning: not negative, of sum one, at most 
 
 `mesh` is a pair (vertices, triangles), of which several meshes may be parts, or SurfaceSamples, which get the
 weights. The field poses the shape by its bones, and the weights are those that come nearest to it. How the
-triangles are joined does not matter. `weights` and `bend_weights` (n,) are the vertices' stiffness, as of
+triangles are joined does not matter. A bone pulls as far as it is inside of the shape; one whose tail is
+outside ends at its children. Bones far off the surface, and coincident_bones, have weights of 0. `weights` and `bend_weights` (n,) are the vertices' stiffness, as of
 sample_mesh. Raises InvalidInput and Cancelled.)");
+  module.def(
+      "coincident_bones", [](const BonesArgument& bones) { return coincident_bones(as_bones(bones)); },
+      "bones"_a, R"(
+Deforming bones that lie where another does, as control bones do: pairs (index, index of the other).
+
+skin_weights passes over the first of each pair. The other is the one nearest to its parent, of several the
+first. Raises InvalidInput.)");
   py::class_<Corrective>(module, "Corrective", "A shape key that takes a skin to the field's poses.")
       .def_readonly("bone", &Corrective::bone, "Index of the bone whose rotation drives it.")
       .def_property_readonly(

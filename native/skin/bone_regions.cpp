@@ -11,6 +11,8 @@
 namespace arapfields {
 namespace {
 
+/// Distance to a bone that does not pull, in largest distances.
+constexpr float unreachable = 1e3f;
 constexpr float unreached = std::numeric_limits<float>::infinity();
 /// A bone may influence another's region within so many steps, or if the bones between them have at most this
 /// length, relative to the distance.
@@ -19,22 +21,22 @@ constexpr double most_between = 0.5;
 
 }  // namespace
 
-BoneRegions::BoneRegions(const Skeleton& skeleton, const PiecePoints& surfaces,
-                         const std::vector<Index>& nodes, double spacing, const InteriorGraph& graph)
-    : straight(graph.size(), skeleton.count()) {
-  for (Index i = 0; i < graph.size(); ++i) {
-    const Vec3 node = surfaces.points.row(nodes[i]);
-    for (Index b = 0; b < skeleton.count(); ++b)
-      straight(i, b) = static_cast<float>((skeleton.nearest(b, node) - node).norm());
-  }
-  NodeOwners owners(surfaces, nodes, spacing, graph, straight);
+BoneRegions::BoneRegions(Skeleton& skeleton, const PiecePoints& surfaces, const std::vector<Index>& nodes,
+                         double spacing, const InteriorGraph& graph) {
+  NodeOwners owners(surfaces, nodes, spacing, graph);
   owner = owners.found(skeleton);
   own_bones = owners.own_bones();
+  pulls = owners.pulls();
+  straight = owners.straight();
 }
 
 RowMatrix<float> BoneRegions::distances(const InteriorGraph& graph) const {
   RowMatrix<float> result(straight.rows(), straight.cols());
   parallel_jobs(straight.cols(), [&](Index b) {
+    if (!pulls[b]) {
+      result.col(b).setConstant(unreachable * straight.maxCoeff());
+      return;
+    }
     std::vector<float> start(owner.size(), unreached);
     for (Index i = 0; i < graph.size(); ++i)
       if (owner[i] == b) start[i] = straight(i, b);
@@ -63,11 +65,13 @@ BoneTree::BoneTree(const Skeleton& skeleton)
     std::vector<std::pair<Index, Index>> open{{from, -1}};  // bones and their predecessors
     for (std::size_t k = 0; k < open.size(); ++k) {
       const auto [b, before] = open[k];
-      const Bone& bone = skeleton.bone(b);
+      double length = 0.0;
+      for (const BonePart& part : skeleton.parts(b))
+        length = std::max(length, (part.end - part.start).norm());
       for (const Index next : joined[b]) {
         if (next == before) continue;
         steps_(from, next) = steps_(from, b) + 1;
-        between_(from, next) = between_(from, b) + (b == from ? 0.0 : (bone.tail - bone.head).norm());
+        between_(from, next) = between_(from, b) + (b == from ? 0.0 : length);
         open.emplace_back(next, b);
       }
     }

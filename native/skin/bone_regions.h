@@ -13,15 +13,18 @@ namespace arapfields {
 /// with the smallest interior distance; nodes of other surfaces belong to the owners of what they touch.
 struct BoneRegions {
   /// The nodes are these samples, about `spacing` apart, and the graph's.
-  BoneRegions(const Skeleton& skeleton, const PiecePoints& surfaces, const std::vector<Index>& nodes,
+  /// Clips the skeleton's bones to the parts inside of the shape.
+  BoneRegions(Skeleton& skeleton, const PiecePoints& surfaces, const std::vector<Index>& nodes,
               double spacing, const InteriorGraph& graph);
 
-  /// Interior distances (n, bones) to each bone, by shortest paths in the graph.
+  /// Interior distances (n, bones) to each bone, by shortest paths in the graph; of bones that neither lie
+  /// inside of the shape nor touch it a constant, larger than all.
   RowMatrix<float> distances(const InteriorGraph& graph) const;
 
   std::vector<Index> owner;      ///< (n) bone of each node
   std::vector<Index> own_bones;  ///< number of bones in each surface
-  RowMatrix<float> straight;     ///< (n, bones) Euclidean distances
+  std::vector<bool> pulls;       ///< whether a bone lies inside of the shape or touches it
+  RowMatrix<float> straight;     ///< (n, bones) Euclidean distances to the parts of the bones
 };
 
 /// Distances between bones along the skeleton's tree.

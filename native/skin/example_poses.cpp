@@ -28,6 +28,14 @@ Mat3 random_rotation(const Bone& bone, Random& random) {
   return angle > 0.0 ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() : Mat3::Identity();
 }
 
+/// The handles of the bones that pull.
+std::vector<Handle> pulling(const RigShape& rig) {
+  std::vector<Handle> result;
+  for (std::size_t b = 0; b < rig.handles.size(); ++b)
+    if (rig.pulls[b]) result.push_back(rig.handles[b]);
+  return result;
+}
+
 /// For intersecting surfaces, a rest shape whose interior paths do not join unrelated bones; else null.
 std::shared_ptr<const RestShape> rest_shape(const RigShape& rig, std::uint64_t seed,
                                             const Progress& progress) {
@@ -42,7 +50,7 @@ std::shared_ptr<const RestShape> rest_shape(const RigShape& rig, std::uint64_t s
 ExamplePoses::ExamplePoses(const RigShape& rig, PointsIn points, const SkinOptions& options,
                            const Progress& progress)
     : rig_(rig),
-      solver_(rig.samples, rig.handles, solver_options(options), progress,
+      solver_(rig.samples, pulling(rig), solver_options(options), progress,
               rest_shape(rig, options.seed, progress)),
       points_(points) {
   solver_.track(points);
@@ -62,8 +70,12 @@ ExamplePose ExamplePoses::draw(Random& random, const Vector& activity, const Pro
     pose.rotations.push_back(turns ? rotation : Mat3::Identity());
   }
   pose.motions = rig_.skeleton.motions(pose.rotations);
-  std::vector<Handle> moved = rig_.handles;
-  for (std::size_t b = 0; b < moved.size(); ++b) moved[b].target = pose.motions[b] * moved[b].rest;
+  std::vector<Handle> moved;
+  for (std::size_t b = 0; b < rig_.handles.size(); ++b) {
+    if (!rig_.pulls[b]) continue;
+    moved.push_back(rig_.handles[b]);
+    moved.back().target = pose.motions[b] * moved.back().rest;
+  }
   solver_.reset();
   solver_.set_targets(moved);
   solver_.follow(0, 0.0, progress);

@@ -9,23 +9,18 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <queue>
 
 #include "core/parallel.h"
+#include "skin/bone_inside.h"
 
 namespace arapfields {
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
-/// Bounds of the number of view points along a bone.
-constexpr Index least_places = 5, most_places = 40;
-/// A view point is inside a surface that covers at least `enough_sides` of the 24 directions; a bone inside
-/// none may be in one that covers at least `least_sides`.
-constexpr int enough_sides = 21, least_sides = 14;
 /// Surfaces with fewer samples cannot enclose a bone.
 constexpr Index least_samples = BoneSight::all_sides;
-/// Least fraction of a bone's view points inside a surface for the bone to be in it.
-constexpr double share_inside = 0.4;
 /// A joint is the centre of a surface with at least so many samples, if the ratio of their largest and
 /// smallest distance, and that of the distance of their mean, are at most these.
 constexpr Index least_around = 4;
@@ -37,47 +32,14 @@ constexpr double ring_share = 0.25;
 /// A surface touches nodes that are at most so many spacings farther than the nearest one.
 constexpr double touching_spacings = 0.5;
 
-/// For each slot the number of directions that its surface must cover at a view point for a bone to be in it
-/// there. A bone in no surface is in the one that covers the most directions.
-std::vector<int> sides_needed(const std::vector<BoneSight>& places, Index slots) {
-  std::vector<int> result(slots, BoneSight::all_sides + 1);
-  int most = 0;
-  Index best = -1;
-  bool any = false;
-  for (Index slot = 0; slot < slots; ++slot) {
-    int inside = 0, sum = 0;
-    for (const BoneSight& place : places) {
-      sum += place.sides(slot);
-      if (place.sides(slot) >= enough_sides) ++inside;
-    }
-    if (inside >= share_inside * static_cast<double>(places.size())) {
-      result[slot] = enough_sides;
-      any = true;
-    }
-    if (sum > most) most = sum, best = slot;
-  }
-  if (!any && most >= least_sides * static_cast<int>(places.size())) result[best] = 0;
-  return result;
-}
-
-/// The view points along a bone, as fractions of its length.
-std::vector<double> shares_along(double length, double spacing) {
-  const Index count = std::clamp(static_cast<Index>(std::ceil(length / spacing)), least_places, most_places);
-  std::vector<double> shares;
-  for (Index k = 0; k < count; ++k)
-    shares.push_back((static_cast<double>(k) + 0.5) / static_cast<double>(count));
-  return shares;
-}
-
 }  // namespace
 
 NodeOwners::NodeOwners(const PiecePoints& surfaces, const std::vector<Index>& nodes, double spacing,
-                       const InteriorGraph& graph, const RowMatrix<float>& straight)
+                       const InteriorGraph& graph)
     : surfaces_(surfaces),
       nodes_(nodes),
       spacing_(spacing),
       graph_(graph),
-      straight_(straight),
       slots_(surfaces.count(), -1),
       best_(nodes.size(), {infinity, -1}),
       own_(slots_.size()) {
@@ -87,7 +49,7 @@ NodeOwners::NodeOwners(const PiecePoints& surfaces, const std::vector<Index>& no
     if (sizes[piece] >= least_samples) slots_[piece] = slot_count_++;
 }
 
-std::vector<Index> NodeOwners::found(const Skeleton& skeleton) {
+std::vector<Index> NodeOwners::found(Skeleton& skeleton) {
   see(skeleton);
   spread();
   take_free_surfaces();
@@ -108,36 +70,30 @@ std::vector<Index> NodeOwners::own_bones() const {
   return result;
 }
 
-/// Initial paths: straight ones from each bone to the visible nodes of the surfaces that contain it.
-void NodeOwners::see(const Skeleton& skeleton) {
-  std::vector<std::vector<Length>> paths(skeleton.count());
+/// Clips the bones, and finds the initial paths: straight ones from each bone to the nodes that it sees.
+void NodeOwners::see(Skeleton& skeleton) {
+  straight_.resize(graph_.size(), skeleton.count());
+  std::vector<std::vector<Length>> paths(skeleton.count(), best_);
+  const BoneSurroundings surroundings(surfaces_, slots_, slot_count_, spacing_);
   parallel_jobs(skeleton.count(), [&](Index b) {
-    const Vec3 head = skeleton.bone(b).head, along = skeleton.bone(b).tail - head;
-    paths[b] = best_;
-    if (skeleton.has_open_end(b)) {
-      if (const Index around = surface_around(head); around >= 0) {
-        for (std::size_t i = 0; i < nodes_.size(); ++i)
-          if (piece(i) == around) paths[b][i] = {straight_(static_cast<Index>(i), b), b};
-        return;
-      }
+    const Index around = skeleton.has_open_end(b) ? surface_around(skeleton.bone(b).head) : -1;
+    std::optional<BoneInside> inside;
+    if (around < 0) {
+      inside.emplace(skeleton, b, surroundings);
+      if (!inside->parts().empty()) skeleton.set_parts(b, inside->parts());
     }
-    std::vector<BoneSight> places;
-    for (const double share : shares_along(along.norm(), spacing_))
-      places.emplace_back(surfaces_, slots_, slot_count_, head + share * along);
-    const std::vector<int> least = sides_needed(places, slot_count_);
-    for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      const Index own = slot(i);
-      if (own < 0) continue;
-      for (const BoneSight& place : places)
-        if (place.sides(own) >= least[own] &&
-            place.sees(surfaces_.points.row(nodes_[i]), own, 0.5 * spacing_)) {
-          paths[b][i] = {straight_(static_cast<Index>(i), b), b};
-          break;
-        }
+    for (Index i = 0; i < graph_.size(); ++i) {
+      const Vec3 node = surfaces_.points.row(nodes_[i]);
+      straight_(i, b) = static_cast<float>((skeleton.nearest(b, node) - node).norm());
+      if (around < 0 ? inside->sees(node, slot(i)) : piece(i) == around) paths[b][i] = {straight_(i, b), b};
     }
   });
+  pulls_.assign(skeleton.count(), false);
   for (const std::vector<Length>& each : paths)
-    for (std::size_t i = 0; i < nodes_.size(); ++i) best_[i] = std::min(best_[i], each[i]);
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      if (each[i].second >= 0) pulls_[each[i].second] = true;
+      best_[i] = std::min(best_[i], each[i]);
+    }
 }
 
 /// The surface whose centre is a joint, such as an eyeball; −1: none.
@@ -163,7 +119,7 @@ Index NodeOwners::surface_around(const Vec3& joint) const {
 }
 
 /// A bone in no surface takes the nearest surface without bones, which it may share with others. If no bone
-/// is in a surface, each node belongs to the nearest bone.
+/// is in a surface, each node belongs to the nearest bone. Any other bone pulls if it touches a surface.
 void NodeOwners::take_free_surfaces() {
   std::vector<bool> has_surface(straight_.cols(), false);
   for (const Length& each : best_)
@@ -172,8 +128,10 @@ void NodeOwners::take_free_surfaces() {
   std::vector<Length> taken(nodes_.size(), {infinity, -1});
   for (Index b = 0; b < straight_.cols(); ++b) {
     Index nearest = 0;
-    straight_.col(b).minCoeff(&nearest);
+    const float distance = straight_.col(b).minCoeff(&nearest);
+    if (none || distance < static_cast<float>(spacing_)) pulls_[b] = true;
     if (has_surface[b] || has_bone(nearest)) continue;
+    pulls_[b] = true;
     for (std::size_t i = 0; i < nodes_.size(); ++i)
       if (none || piece(i) == piece(nearest))
         taken[i] = std::min(taken[i], Length(straight_(static_cast<Index>(i), b), b));

@@ -12,13 +12,16 @@ namespace arapfields {
 /// Finds the owner bone of each node of a shape whose surfaces may intersect. Borrows its arguments.
 class NodeOwners {
  public:
-  /// The nodes, which are the graph's, are these rows of the samples, about `spacing` apart; `straight`
-  /// (n, bones) are Euclidean distances.
+  /// The nodes, which are the graph's, are these rows of the samples, about `spacing` apart.
   NodeOwners(const PiecePoints& surfaces, const std::vector<Index>& nodes, double spacing,
-             const InteriorGraph& graph, const RowMatrix<float>& straight);
+             const InteriorGraph& graph);
 
-  /// The owner (n) of each node.
-  std::vector<Index> found(const Skeleton& skeleton);
+  /// The owner (n) of each node. Clips the skeleton's bones to the parts inside of the shape.
+  std::vector<Index> found(Skeleton& skeleton);
+  /// (n, bones) Euclidean distances to the parts of the bones.
+  const RowMatrix<float>& straight() const { return straight_; }
+  /// Whether a bone lies inside of the shape or touches it.
+  const std::vector<bool>& pulls() const { return pulls_; }
   /// The number of bones in each surface.
   std::vector<Index> own_bones() const;
 
@@ -32,7 +35,7 @@ class NodeOwners {
   double square(std::size_t node, std::size_t other) const {
     return (surfaces_.points.row(nodes_[node]) - surfaces_.points.row(nodes_[other])).squaredNorm();
   }
-  void see(const Skeleton& skeleton);
+  void see(Skeleton& skeleton);
   Index surface_around(const Vec3& joint) const;
   void take_free_surfaces();
   void spread();
@@ -47,7 +50,8 @@ class NodeOwners {
   const std::vector<Index>& nodes_;
   double spacing_;
   const InteriorGraph& graph_;
-  const RowMatrix<float>& straight_;
+  RowMatrix<float> straight_;
+  std::vector<bool> pulls_;
   std::vector<Index> slots_;  // of surfaces with enough samples to enclose bones; −1: others
   Index slot_count_ = 0;
   std::vector<Length> best_;

@@ -63,12 +63,6 @@ RigShape::RigShape(const SurfaceSamples& given, const std::vector<Bone>& bones, 
   }
   places_ = OrientedPoints(nodes.points, nodes.normals);
   extent = body_size(surface.points);
-  symmetry = skeleton.symmetry(symmetric_bones * extent);
-  for (Index b = 0; b < skeleton.count(); ++b) {
-    const Index other = symmetry.mirrored[b];
-    const double middle = 0.5 * (skeleton.bone(b).head + skeleton.bone(b).tail)[symmetry.axis];
-    sides.push_back(other < 0 || other == b ? 0 : middle < symmetry.offset ? -1 : 1);
-  }
   // The mean spacing on a sphere of the same size.
   spacing = std::sqrt(4.0 * std::numbers::pi / static_cast<double>(size())) * extent / 2.5;
   progress.check();
@@ -77,6 +71,16 @@ RigShape::RigShape(const SurfaceSamples& given, const std::vector<Bone>& bones, 
   const BoneRegions regions(skeleton, surface, chosen, spacing, all);
   owners = regions.owner;
   own_bones_ = regions.own_bones;
+  pulls = regions.pulls;
+  tree = BoneTree(skeleton);
+  symmetry = skeleton.symmetry(symmetric_bones * extent);
+  for (Index b = 0; b < skeleton.count(); ++b) {
+    const Index other = symmetry.mirrored[b];
+    double middle = 0.0;
+    for (const BonePart& part : skeleton.parts(b))
+      middle += 0.5 * (part.start + part.end)[symmetry.axis] / static_cast<double>(skeleton.parts(b).size());
+    sides.push_back(other < 0 || other == b ? 0 : middle < symmetry.offset ? -1 : 1);
+  }
   set_movers();
   set_trust();
   const InteriorGraph graph(nodes.points, nodes.normals, spacing,
@@ -208,7 +212,18 @@ RigShape rig_shape(const TriangleMesh& mesh, const WeldedVertices& welded, const
 }
 
 std::vector<Handle> bone_handles(const SurfaceSamples& samples, const std::vector<Bone>& bones) {
-  return RigShape(samples, bones, {}).handles;
+  RigShape rig(samples, bones, {});
+  std::vector<Index> place(bones.size(), -1);
+  for (Index b = 0; b < rig.skeleton.count(); ++b) place[rig.skeleton.original(b)] = b;
+  for (const auto& [bone, at] : coincident_bones(bones)) place[bone] = place[at];
+  std::vector<Handle> result;
+  for (std::size_t i = 0; i < bones.size(); ++i) {
+    if (place[i] < 0) continue;
+    result.push_back(rig.handles[place[i]]);
+    result.back().rest = bone_box(bones[i]);
+    result.back().target = result.back().rest;
+  }
+  return result;
 }
 
 }  // namespace arapfields

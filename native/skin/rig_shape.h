@@ -53,12 +53,13 @@ struct RigShape {
   Skeleton skeleton;
   BoneTree tree;
   Skeleton::Symmetry symmetry;
-  std::vector<int> sides;  ///< side of each bone: −1 or 1 off the symmetry plane, else 0
-  std::vector<Handle> handles;
-  PiecePoints surface;  ///< the samples
-  PiecePoints nodes;    ///< (n) the subset of nodes
-  double extent;        ///< size of the shape
-  double spacing;       ///< mean spacing of the nodes
+  std::vector<int> sides;       ///< side of each bone: −1 or 1 off the symmetry plane, else 0
+  std::vector<bool> pulls;      ///< whether each bone lies inside of the shape or touches it
+  std::vector<Handle> handles;  ///< of all bones
+  PiecePoints surface;          ///< the samples
+  PiecePoints nodes;            ///< (n) the subset of nodes
+  double extent;                ///< size of the shape
+  double spacing;               ///< mean spacing of the nodes
   /// Neighbours of each node in the interior graph, with weights of sum one.
   std::vector<std::vector<std::pair<Index, double>>> neighbours;
   RowMatrix<float> bone_distances;  ///< (n, bones) interior distances
@@ -88,9 +89,9 @@ struct RigShape {
 RigShape rig_shape(const TriangleMesh& mesh, const WeldedVertices& welded, const VertexWeights& painted,
                    const std::vector<Bone>& bones, const SkinOptions& options, const Progress& progress);
 
-/// Each bone as a handle at rest, which holds the samples around its middle, or up to its tail if it is a
-/// leaf. Mesh coordinates. Throws InvalidInput as Skeleton does, and where a bone lies far outside of the
-/// shape.
+/// Each deforming bone as a handle at rest, which holds the samples around its middle, or up to its tail if
+/// it is a leaf. Mesh coordinates. Throws InvalidInput as Skeleton does, and where a bone lies far outside of
+/// the shape.
 ARAPFIELDS_EXPORT std::vector<Handle> bone_handles(const SurfaceSamples& samples,
                                                    const std::vector<Bone>& bones);
 

@@ -14,18 +14,22 @@ namespace {
 /// Tolerances of copies_length(), in lengths of the bone.
 constexpr double same_length = 1e-4, apart = 1e-2;
 
-std::string name_of(const std::vector<Bone>& bones, Index i) {
-  return bones[i].name.empty() ? "bones[" + std::to_string(i) + "]" : "bone " + bones[i].name;
+/// Tolerance of bones in one place, in lengths of the longest bone.
+constexpr double same_place = 1e-6;
+
+double longest_of(const std::vector<Bone>& bones) {
+  double longest = 0.0;
+  for (const Bone& bone : bones) longest = std::max(longest, (bone.tail - bone.head).norm());
+  return longest;
 }
 
 void require_bones(const std::vector<Bone>& bones) {
   require(std::ranges::any_of(bones, &Bone::deform), "bones", "none deforms", "at least one is needed");
   const Index n = static_cast<Index>(bones.size());
-  double longest = 0.0;
-  for (const Bone& bone : bones) longest = std::max(longest, (bone.tail - bone.head).norm());
+  const double longest = longest_of(bones);
   for (Index i = 0; i < n; ++i) {
     const Bone& bone = bones[i];
-    const std::string name = name_of(bones, i);
+    const std::string name = bone.name.empty() ? "bones[" + std::to_string(i) + "]" : "bone " + bone.name;
     require(bone.head.allFinite() && bone.tail.allFinite() && std::isfinite(bone.roll), name,
             "NaN or infinity", "head, tail and roll must be finite");
     require(bone.parent >= -1 && bone.parent < n, name, "parent " + std::to_string(bone.parent),
@@ -37,13 +41,17 @@ void require_bones(const std::vector<Bone>& bones) {
       require(bone.limits->allFinite() && (bone.limits->col(0).array() <= bone.limits->col(1).array()).all(),
               name, "limits that are not finite, or a lowest above a highest", "(3, 2) angles are needed");
     if (!bone.deform) continue;
-    require((bone.tail - bone.head).norm() > 1e-6 * longest, name, "it has no length",
+    require((bone.tail - bone.head).norm() > same_place * longest, name, "it has no length",
             "head and tail must differ");
-    for (Index j = 0; j < i; ++j)
-      require(!bones[j].deform || std::max((bones[j].head - bone.head).norm(),
-                                           (bones[j].tail - bone.tail).norm()) > 1e-6 * longest,
-              name, "it lies where " + name_of(bones, j) + " does", "each needs a place of its own");
   }
+}
+
+/// The point of a part closest to another, and its parameter, 0 at the start and 1 at the end.
+std::pair<Vec3, double> closest_on(const BonePart& part, const Vec3& point) {
+  const Vec3 along = part.end - part.start;
+  const double square = along.squaredNorm();
+  const double t = square > 0.0 ? std::clamp((point - part.start).dot(along) / square, 0.0, 1.0) : 0.0;
+  return {part.start + t * along, t};
 }
 
 /// Whether a bone begins apart from its parent's tail and is exactly as long.
@@ -55,8 +63,35 @@ bool copies_length(const Bone& bone, const Bone& parent) {
 
 }  // namespace
 
-Skeleton::Skeleton(const std::vector<Bone>& bones) {
+std::vector<std::pair<Index, Index>> coincident_bones(const std::vector<Bone>& bones) {
   require_bones(bones);
+  const Index n = static_cast<Index>(bones.size());
+  const double near = same_place * longest_of(bones);
+  const auto from_parent = [&](Index i) {
+    const Index parent = bones[i].parent;
+    return parent < 0
+               ? std::numeric_limits<double>::infinity()
+               : (closest_on({bones[parent].head, bones[parent].tail}, bones[i].head).first - bones[i].head)
+                     .norm();
+  };
+  std::vector<Index> kept;  // for each bone so far the one at its place
+  for (Index i = 0; i < n; ++i) {
+    Index at = i;
+    for (Index j = 0; j < i && at == i && bones[i].deform; ++j)
+      if (bones[j].deform && (bones[j].head - bones[i].head).norm() <= near &&
+          (bones[j].tail - bones[i].tail).norm() <= near)
+        at = kept[j];
+    kept.push_back(at);
+    if (at != i && from_parent(i) < from_parent(at) - near) std::ranges::replace(kept, at, i);
+  }
+  std::vector<std::pair<Index, Index>> result;
+  for (Index i = 0; i < n; ++i)
+    if (kept[i] != i) result.emplace_back(i, kept[i]);
+  return result;
+}
+
+Skeleton::Skeleton(std::vector<Bone> bones) {
+  for (const auto& [bone, at] : coincident_bones(bones)) bones[bone].deform = false;
   std::vector<Index> place(bones.size(), -1);
   for (std::size_t i = 0; i < bones.size(); ++i)
     if (bones[i].deform) {
@@ -68,6 +103,8 @@ Skeleton::Skeleton(const std::vector<Bone>& bones) {
     while (bone.parent >= 0 && !bones[bone.parent].deform) bone.parent = bones[bone.parent].parent;
     if (bone.parent >= 0) bone.parent = place[bone.parent];
   }
+  for (const Bone& bone : bones_) parts_.push_back({{bone.head, bone.tail}});
+  joined_.assign(bones_.size(), false);
   join_roots();
   leaf_.assign(bones_.size(), true);
   for (const Bone& bone : bones_)
@@ -101,6 +138,7 @@ void Skeleton::join_roots() {
       }
     if (joining < 0) return;
     bones_[joining].parent = to;
+    joined_[joining] = true;
     std::ranges::replace(root, joining, main);
   }
 }
@@ -150,21 +188,52 @@ Skeleton::Symmetry Skeleton::symmetry(double tolerance) const {
       };
       for (Index b = 0; b < count(); ++b) {
         const Vec3 head = reflected(bones_[b].head), tail = reflected(bones_[b].tail);
-        const auto twin = std::ranges::find_if(bones_, [&](const Bone& other) {
-          return (other.head - head).norm() < tolerance && (other.tail - tail).norm() < tolerance;
-        });
-        found.mirrored.push_back(twin == bones_.end() ? -1 : twin - bones_.begin());
-        if (found.mirrored[b] >= 0 && found.mirrored[b] != b) ++found.pairs;
+        Index twin = -1;
+        for (Index other = 0; other < count(); ++other) {
+          if (!((bones_[other].head - head).norm() < tolerance)) continue;
+          const bool whole = (bones_[other].tail - tail).norm() < tolerance;
+          if (whole || (twin < 0 && !reaches_tail(b) && !reaches_tail(other))) twin = other;
+          if (whole) break;
+        }
+        found.mirrored.push_back(twin);
       }
+      for (Index b = 0; b < count(); ++b)
+        if (const Index twin = found.mirrored[b]; twin >= 0 && found.mirrored[twin] != b)
+          found.mirrored[b] = -1;
+      for (Index b = 0; b < count(); ++b)
+        if (found.mirrored[b] >= 0 && found.mirrored[b] != b) ++found.pairs;
       if (found.pairs > best.pairs) best = std::move(found);
     }
   }
   return best;
 }
 
-double Skeleton::along(Index b, const Vec3& point) const {
-  const Vec3 axis = bones_[b].tail - bones_[b].head;
-  return std::clamp((point - bones_[b].head).dot(axis) / axis.squaredNorm(), 0.0, 1.0);
+std::vector<Vec3> Skeleton::joints(Index b) const {
+  std::vector<Vec3> result;
+  const double least = apart * (bones_[b].tail - bones_[b].head).norm();
+  for (Index child = 0; child < count(); ++child) {
+    const Vec3& joint = bones_[child].head;
+    const auto ends_there = [&](const Bone& other) {
+      return other.parent == b && (other.tail - joint).norm() <= least;
+    };
+    if (bones_[child].parent == b && !joined_[child] && (joint - bones_[b].head).norm() > least &&
+        (joint - bones_[b].tail).norm() > least && std::ranges::none_of(bones_, ends_there))
+      result.push_back(joint);
+  }
+  return result;
+}
+
+bool Skeleton::reaches_tail(Index b) const {
+  return std::ranges::any_of(parts_[b], [&](const BonePart& part) { return part.end == bones_[b].tail; });
+}
+
+std::pair<Vec3, double> Skeleton::closest(Index b, const Vec3& point) const {
+  std::pair<Vec3, double> best = closest_on(parts_[b].front(), point);
+  for (std::size_t k = 1; k < parts_[b].size(); ++k) {
+    const std::pair<Vec3, double> other = closest_on(parts_[b][k], point);
+    if ((other.first - point).squaredNorm() < (best.first - point).squaredNorm()) best = other;
+  }
+  return best;
 }
 
 }  // namespace arapfields

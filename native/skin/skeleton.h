@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/types.h"
@@ -27,13 +28,24 @@ struct Bone {
 Mat3 bone_axes(const Bone& bone);
 ARAPFIELDS_EXPORT Mat4 bone_box(const Bone& bone);
 
-/// The deforming bones of a rig; a bone's parent is its nearest deforming ancestor. If there are several
-/// roots, all but that of the largest tree become children of the bone nearest to their heads.
+/// A straight part of a bone.
+struct BonePart {
+  Vec3 start;
+  Vec3 end;
+};
+
+/// The deforming bones that lie where another does, as control bones do, and the one that they lie at. This
+/// is the one nearest to its parent, of several the first.
+ARAPFIELDS_EXPORT std::vector<std::pair<Index, Index>> coincident_bones(const std::vector<Bone>& bones);
+
+/// The deforming bones of a rig; of those that lie in one place only one is kept. A bone's parent is its
+/// nearest deforming ancestor. If there are several roots, all but that of the largest tree become children
+/// of the bone nearest to their heads.
 class Skeleton {
  public:
   /// Throws InvalidInput that names the bone: none deforms, numbers that are not finite, parents out of range
-  /// or in a circle, no length, two in one place.
-  explicit Skeleton(const std::vector<Bone>& bones);
+  /// or in a circle, no length.
+  explicit Skeleton(std::vector<Bone> bones);
 
   Index count() const { return static_cast<Index>(bones_.size()); }
   const Bone& bone(Index b) const { return bones_[b]; }  ///< its parent is among the deforming ones
@@ -43,7 +55,8 @@ class Skeleton {
   bool has_open_end(Index b) const { return open_[b]; }
   /// Motions (bones) from rest, from each bone's rotation in its own axes.
   std::vector<Mat4> motions(const std::vector<Mat3>& rotations) const;
-  /// The mirrored bone of each (−1: none) across the coordinate plane with the most pairs.
+  /// The mirrored bone of each (−1: none) across the coordinate plane with the most pairs. Of bones that end
+  /// before their tails the heads count.
   struct Symmetry {
     int axis = 0;
     double offset = 0.0;
@@ -52,12 +65,18 @@ class Skeleton {
     bool is_whole() const { return pairs > 0 && std::ranges::find(mirrored, -1) == mirrored.end(); }
   };
   Symmetry symmetry(double tolerance) const;
-  /// Parameter of the bone's closest point, 0 at its head and 1 at its tail.
-  double along(Index b, const Vec3& point) const;
-  Vec3 nearest(Index b, const Vec3& point) const { return place(b, along(b, point)); }
+  /// The heads of a bone's children, but those where it or another child ends.
+  std::vector<Vec3> joints(Index b) const;
+  /// The parts of a bone, first one from head to tail; a shape has only those inside of it.
+  const std::vector<BonePart>& parts(Index b) const { return parts_[b]; }
+  void set_parts(Index b, std::vector<BonePart> parts) { parts_[b] = std::move(parts); }
+  /// The closest point of a bone's parts, and its parameter, 0 at the start of its part and 1 at the end.
+  Vec3 nearest(Index b, const Vec3& point) const { return closest(b, point).first; }
+  double along(Index b, const Vec3& point) const { return closest(b, point).second; }
 
  private:
-  Vec3 place(Index b, double t) const { return bones_[b].head + t * (bones_[b].tail - bones_[b].head); }
+  bool reaches_tail(Index b) const;
+  std::pair<Vec3, double> closest(Index b, const Vec3& point) const;
   void join_roots();
 
   std::vector<Bone> bones_;
@@ -65,6 +84,8 @@ class Skeleton {
   std::vector<Index> order_;  // parents first
   std::vector<bool> leaf_;
   std::vector<bool> open_;
+  std::vector<bool> joined_;  // whether join_roots() gave it its parent
+  std::vector<std::vector<BonePart>> parts_;
 };
 
 }  // namespace arapfields

@@ -11,6 +11,7 @@ if IN_BLENDER:
     from support.blender import scenes
     from support.blender.skins import SIDES, eye, person, shirt, weights_of
 
+    from addon.core.runtime import jobs
     from addon.names import CORRECTIVE
 
 pytestmark = pytest.mark.in_blender
@@ -136,6 +137,24 @@ def test_the_pose_at_hand_does_not_matter():
     assert rig.data.pose_position == "POSE" and np.allclose(weights_of(body, names), first, atol=1e-5)
 
 
+def test_control_bones_move_nothing_and_are_named():
+    body, rig = person()
+
+    def add(bones):
+        one = bones.new("IK.Spine")
+        one.head, one.tail = bones["Spine"].head, bones["Spine"].tail
+        pole = bones.new("Pole")
+        pole.head, pole.tail = (0, -0.4, 0.4), (0, -0.5, 0.4)
+
+    scenes.edit_bones(rig, add)
+    scenes.activate(body, rig)
+    assert bpy.ops.arapfields.skin(**QUICK) == {"FINISHED"}
+    assert not {"IK.Spine", "Pole"} & set(body.vertex_groups.keys())
+    texts = [text for level, text in jobs.messages() if level == "WARNING"]
+    assert any("others lie there: IK.Spine" in text for text in texts), texts
+    assert any("No vertex follows Pole" in text for text in texts), texts
+
+
 def far_bone(body, rig):
     scenes.edit_bones(
         rig, lambda bones: setattr(bones["Spine"], "tail", (0, 0, 1.0)) or far(bones.new("Far"))
@@ -144,14 +163,6 @@ def far_bone(body, rig):
 
 def far(bone):
     bone.head, bone.tail = (9, 0, 0), (9, 0, 1)
-
-
-def twin(body, rig):
-    def add(bones):
-        one = bones.new("Twin")
-        one.head, one.tail = bones["Spine"].head, bones["Spine"].tail
-
-    scenes.edit_bones(rig, add)
 
 
 def no_deforming(body, rig):
@@ -189,7 +200,6 @@ def bones_are_handles(body, rig):
 
 REFUSALS = {
     "far outside": far_bone,
-    "where bone Spine does": twin,
     "No bone of Rig deforms": no_deforming,
     "Rig has no bones": no_bones,
     "Body: the mesh has no faces": no_faces,

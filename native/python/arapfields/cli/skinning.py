@@ -2,6 +2,7 @@
 """The verb skin: bone weights and correctives of a mesh, for bones from a file."""
 
 import json
+import sys
 
 import numpy as np
 
@@ -71,6 +72,8 @@ def run(args):
                 "corrective_offsets": np.array([key.offsets for key in keys]),
             }
         outputs.write(place, lambda path: write_arrays(path, **arrays))
+    for bone, other in () if args.quiet else af.coincident_bones(bones):
+        print(f"note: {bones[bone].name} lies where {bones[other].name} does: passed over", file=sys.stderr)
     verbs.summary(args, f"wrote weights of {len(weights)} vertices for {len(bones)} bones to {args.output}")
 
 
