@@ -81,6 +81,8 @@ def notes_on(term, handles, report):
         UserError("{name} crosses the surface; what lies inside of it stays there", solid(name))
         for name in report.contact.crossing
     ]
+    if report.contact.self_intersections:
+        found.append(UserError("Parts of the shape still pass through each other"))
     for held in report.contact.held:
         handle = handles[held.handle]
         if not handle.name:  # holds the region that is far from all pins

@@ -24,7 +24,8 @@ py::object contact_report(const ContactReport& contact) {
   for (const HeldBack& h : contact.held)
     held.append(make_report("HeldBack", "handle"_a = h.handle, "by"_a = h.by, "distance"_a = h.distance));
   return make_report("ContactReport", "deepest"_a = contact.deepest, "touching"_a = contact.touching,
-                     "held"_a = py::tuple(held), "crossing"_a = py::tuple(py::cast(contact.crossing)));
+                     "held"_a = py::tuple(held), "crossing"_a = py::tuple(py::cast(contact.crossing)),
+                     "self_intersections"_a = contact.self_intersections);
 }
 
 const char* name_of(StopReason reason) {

@@ -51,9 +51,14 @@ struct ContactReport {
   std::vector<HeldBack> held;
   /// Names of the obstacles that cross the surface at the start: samples inside them are not pushed out.
   std::vector<std::string> crossing;
+  /// Pairs of triangles of the samples' mesh, of parts that are far from each other at rest, that pass
+  /// through each other and do not at rest; none: without self-contact, or the samples know no mesh.
+  std::optional<Index> self_intersections;
+  Vec3 intersection = Vec3::Zero();  ///< where one pair does, mesh units
 };
 
-/// One sentence for each handle that is held back, and for each obstacle that crosses the surface.
+/// One sentence for each handle that is held back, for each obstacle that crosses the surface, and for parts
+/// of it that pass through each other.
 std::vector<std::string> notes_on(const ContactReport& report);
 
 /// Throws InvalidInput for null functions and for numbers that are negative or not finite.

@@ -247,3 +247,30 @@ def test_a_report_is_of_the_planes_found_last():
     live.set_secondary_motion(af.SecondaryMotionOptions(), up=up, ground=-2.0)
     live.set_handles([handle])
     assert np.isfinite(live.solve([rows[1]], **few)(rows)).all()
+
+
+@pytest.mark.parametrize(
+    ("contact", "named"),
+    [
+        (lambda: af.Contact([af.Obstacle(BALL, margin=1e300)]), r"obstacles\[0\]\.margin: 1e\+300"),
+        (
+            lambda: af.Contact([af.Obstacle(BALL), af.Obstacle(BALL, margin=1e30)]),
+            r"obstacles\[1\]\.margin: 1e\+30",
+        ),
+        (lambda: af.Contact(ground=1e300), "ground: 1e.300 above the shape"),
+        (lambda: af.Contact(ground=1e30), "ground: 1e.30 above the shape"),
+        (
+            lambda: af.Contact([af.Obstacle(BALL, placement=turned(0, shift=(1e300, 0, 0)))]),
+            r"obstacles\[0\]\.placement",
+        ),
+    ],
+)
+def test_what_is_too_far_from_the_shape_is_named(contact, named):
+    """It was called points that are not finite, or diverged."""
+    samples = af.SurfaceSamples(np.eye(3).repeat(20, 0), np.eye(3).repeat(20, 0))
+    with pytest.raises(af.InvalidInput, match=named):
+        af.LiveDeformer(samples, [af.Cuboid(np.eye(4), np.eye(4))], QUICK, contact=contact())
+
+
+def test_a_tiny_margin_is_a_margin():
+    assert af.Obstacle(BALL, margin=1e-300).margin == 1e-300

@@ -28,6 +28,10 @@ INSIDE = 5e-4
 # to .127.
 NOT_FLAT = 0.09
 
+# Distances at rest of triangles: those of different legs are farther from each other than the first, those of
+# legs that are far through the inside nearer than the second.
+BESIDE, ACROSS = 0.1, 0.2
+
 
 def drag(live, way, steps=11):
     """Both hands inwards, along and up by `way`, and back: (shares flipped, energy at the far end)"""
@@ -75,6 +79,68 @@ def test_feet_that_jump_past_each_other_do_not_end_in_each_other(aside):
         vertices, triangles = trimesh.remesh.subdivide(vertices, triangles)
     assert overlaps.overlapping(vertices, field(vertices), triangles) < INSIDE
     assert field.report.flipped_share == 0
+
+
+def figure_with_feet(count=5000):
+    """Trousers, and handles of the trunk and both feet."""
+    vertices, triangles = af.extract_surface(trousers(), 40)[:2]
+    rest = [box([0, 0, 1.1], [0.3] * 3), *(box([side * LEG, 0, FOOT], [0.1] * 3) for side in (-1, 1))]
+    return vertices, triangles, af.sample_mesh(vertices, triangles, count, seed=0), rest
+
+
+def pairs_that_cross(vertices, triangles, rest, far):
+    """Pairs of triangles so far from each other at rest, of which an edge of one passes through the other."""
+    corners, middles = vertices[triangles], rest[triangles].mean(1)
+    low, high = corners.min(1), corners.max(1)
+    pairs = set()
+    for i in range(len(triangles)):
+        j = np.flatnonzero((low <= high[i]).all(1) & (high >= low[i]).all(1))
+        for other in j[np.linalg.norm(middles[j] - middles[i], axis=1) > far]:
+            for edges, face in ((corners[i], corners[other]), (corners[other], corners[i])):
+                start, way = edges, np.roll(edges, -1, 0) - edges
+                a, first, second = face[0], face[1] - face[0], face[2] - face[0]
+                parts = np.linalg.solve(
+                    np.stack([np.tile(first, (3, 1)), np.tile(second, (3, 1)), -way], 2),
+                    (start - a)[..., None],
+                )
+                u, v, t = parts[..., 0].T
+                if ((u > 0) & (v > 0) & (u + v < 1) & (t > 0) & (t < 1)).any():
+                    pairs.add((min(i, other), max(i, other)))
+    return len(pairs)
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.03])
+def test_legs_moved_into_each_other_end_apart(aside):
+    """Each half of the way to the other, where neither is the one that gives way."""
+    vertices, triangles, samples, rest = figure_with_feet()
+    handles = [af.Cuboid(rest[0], rest[0])]
+    for side, foot in zip((-1, 1), rest[1:], strict=True):
+        handles.append(af.Cuboid(foot, turned(0, shift=(-side * LEG, side * aside, 0)) @ foot))
+    field = af.deform(samples, handles, af.DeformOptions(centers=400), contact=af.Contact(itself=True))
+    assert field.report.contact.self_intersections == 0
+    assert pairs_that_cross(field(vertices), triangles, vertices, BESIDE) == 0
+
+
+def test_a_report_counts_parts_that_pass_through_each_other():
+    vertices, triangles, samples, rest = figure_with_feet(3000)
+    live = af.LiveDeformer(samples, [af.Cuboid(m, m) for m in rest])
+    feet = [turned(0, shift=(-side * LEG, 0, 0)) @ foot for side, foot in zip((-1, 1), rest[1:], strict=True)]
+    free = live.solve([rest[0], *feet], iterations=40)
+    assert free.report.contact.self_intersections is None
+    live.set_contact(af.Contact(itself=True))
+    report = live.solve(iterations=1).report
+    least, most = (
+        pairs_that_cross(live.field(vertices), triangles, vertices, far) for far in (ACROSS, BESIDE)
+    )
+    crossing = report.contact.self_intersections
+    assert 0 < least <= crossing <= most
+    assert f"{crossing} pairs of triangles" in " ".join(report.notes)
+    without = af.LiveDeformer(
+        af.SurfaceSamples(samples.points, samples.normals, samples.frame),
+        [af.Cuboid(rest[0], rest[0])],
+        contact=af.Contact(itself=True),
+    )
+    assert without.solve().report.contact.self_intersections is None
 
 
 @pytest.mark.parametrize(("degrees", "steps"), [(35, 0), (50, 20)], ids=["in one go", "dragged"])

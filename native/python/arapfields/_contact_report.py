@@ -28,3 +28,6 @@ class ContactReport(Report):
     held: tuple[HeldBack, ...]
     crossing: tuple[str, ...]
     """Obstacles, such as "obstacles[0]", that cross the surface at rest; points inside them stay."""
+    self_intersections: int | None
+    """Pairs of the mesh's triangles that pass through each other and do not at rest, of parts that are far
+    from each other there. None without `itself`, for samples that know no mesh, and after step()."""

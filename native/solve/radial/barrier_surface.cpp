@@ -59,6 +59,12 @@ std::vector<std::string> notes_on(const ContactReport& report) {
                     number_text(held.distance) + " from its target");
   for (const std::string& name : report.crossing)
     notes.push_back(name + " crosses the surface; what lies inside of it stays there");
+  if (const Index pairs = report.self_intersections.value_or(0); pairs > 0) {
+    const Vec3& at = report.intersection;
+    notes.push_back("parts of the shape pass through each other, at (" + number_text(at[0]) + ", " +
+                    number_text(at[1]) + ", " + number_text(at[2]) + "): " + std::to_string(pairs) +
+                    (pairs == 1 ? " pair" : " pairs") + " of triangles");
+  }
   return notes;
 }
 

@@ -22,11 +22,11 @@ constexpr double better = 0.01;
 /// Fills the report's part on contact.
 void report_contact(RadialState& s, const std::vector<Index>& held_by) {
   const double depth = s.contact.deepest();
-  s.report.contact = {s.problem.frame().scale * depth,
-                      s.contact.found().contact_area(),
-                      depth > ContactSet::deep,
-                      held_back_handles(s, held_by),
-                      {}};
+  ContactReport& report = s.report.contact = {};
+  report.deepest = s.problem.frame().scale * depth;
+  report.touching = s.contact.found().contact_area();
+  report.unsettled = depth > ContactSet::deep;
+  report.held = held_back_handles(s, held_by);
 }
 
 /// The objective without its contact term.

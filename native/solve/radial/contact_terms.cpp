@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/errors.h"
+#include "fields/radial_field.h"
 #include "sampling/sample_choice.h"
 #include "solve/radial/handle_motion.h"
 
@@ -16,6 +17,8 @@ namespace {
 constexpr double near = 0.04, near_itself = 0.05;
 /// Tolerance of the gap, in cube units, within which parts do not touch each other.
 constexpr double slight = 2e-4;
+/// Largest margin, height of a ground above the shape and distance of an obstacle, in cube units.
+constexpr double farthest_placed = 1e6;
 /// Upper bound of self-contact's search distance, in cube units.
 constexpr double farthest = 0.12;
 /// Least cosine of the nearest normal with the normal where the path entered, for both to be on one side of
@@ -112,10 +115,16 @@ void ContactTerms::set(const std::optional<Contact>& contact, const RowMatrix<do
   std::vector<BarrierSurface> next = surfaces_of(contact, second_ground_);
   if (!goes_on) {
     std::optional<SelfContact> self;
-    if (contact && contact->itself) self.emplace(problem_, points_.samples(), safety_distance_itself);
+    std::optional<SelfCrossings> crossings;
+    if (contact && contact->itself) {
+      self.emplace(problem_, points_.samples(), safety_distance_itself);
+      crossings.emplace(problem_, points_.samples(), points_.spacing());
+    }
     forget();
     contact_ = contact;
     self_ = std::move(self);
+    crossings_.reset();
+    if (crossings) crossings_.emplace(*std::move(crossings));
     set_surfaces(std::move(next));
     return begin(coefficients);
   }
@@ -149,16 +158,32 @@ void ContactTerms::set_second_ground(const std::optional<Ground>& ground,
   begin(coefficients);
 }
 
-/// The surfaces of a contact; chooses the contact points, if it needs any.
+/// The surfaces of a contact; chooses the contact points, if it needs any. Throws InvalidInput for what is
+/// too far from the shape for the precision of places.
 std::vector<BarrierSurface> ContactTerms::surfaces_of(const std::optional<Contact>& contact,
                                                       const std::optional<Ground>& second_ground) {
   std::vector<BarrierSurface> surfaces;
-  if (contact) {
-    for (const Obstacle& obstacle : contact->obstacles) surfaces.emplace_back(obstacle, problem_.frame());
-    if (contact->ground)
-      surfaces.push_back(BarrierSurface::ground({*contact->ground, contact->up}, problem_.frame()));
+  const Frame& frame = problem_.frame();
+  const std::string allowed = "at most " + number_text(farthest_placed * frame.scale) +
+                              " is allowed, a million times half the shape's size";
+  const auto add_ground = [&](const Ground& ground) {
+    const double above = ground.height - frame.center.dot(ground.up.normalized());
+    require(above <= farthest_placed * frame.scale, "ground", number_text(above) + " above the shape",
+            allowed);
+    surfaces.push_back(BarrierSurface::ground(ground, frame));
+  };
+  for (std::size_t i = 0; contact && i < contact->obstacles.size(); ++i) {
+    const Obstacle& obstacle = contact->obstacles[i];
+    const std::string name = "obstacles[" + std::to_string(i) + "]";
+    require(obstacle.margin <= farthest_placed * frame.scale, name + ".margin", number_text(obstacle.margin),
+            allowed);
+    surfaces.emplace_back(obstacle, frame);
+    const double reach = surfaces.back().placement().topRows<3>().cwiseAbs().maxCoeff();
+    require(reach <= farthest_placed, name + ".placement",
+            number_text(frame.scale * reach) + " from the shape", allowed);
   }
-  if (second_ground) surfaces.push_back(BarrierSurface::ground(*second_ground, problem_.frame()));
+  if (contact && contact->ground) add_ground({*contact->ground, contact->up});
+  if (second_ground) add_ground(*second_ground);
   if (!surfaces.empty() || (contact && contact->itself)) points_.choose();
   return surfaces;
 }
@@ -324,7 +349,20 @@ void ContactTerms::add_own_planes(const RowMatrix<double>& coefficients, bool ju
   }
 }
 
+std::vector<SelfCrossing> ContactTerms::self_crossings(const RowMatrix<double>& coefficients,
+                                                       const std::shared_ptr<const Influence>& influence) {
+  if (!sees_crossings()) return {};
+  const auto moved = [&](const Points& places) {
+    const RadialField field(problem_.basis, coefficients, influence);
+    Points result(places.rows(), 3);
+    field.evaluate(places, {result.data(), result.rows(), JetOrder::value});
+    return result;
+  };
+  return crossings_->find(*self_, samples_of(points_.at(coefficients)), moved);
+}
+
 bool ContactTerms::overlaps(const RowMatrix<double>& coefficients) {
+  if (!self_crossings(coefficients).empty()) return true;
   return self_ && self_->overlaps(samples_of(points_.at(coefficients)), points_.normals_at(coefficients));
 }
 

@@ -5,10 +5,12 @@
 #include <optional>
 #include <vector>
 
+#include "fields/influence.h"
 #include "solve/radial/barrier_surface.h"
 #include "solve/radial/contact_points.h"
 #include "solve/radial/contact_sides.h"
 #include "solve/radial/secondary_motion.h"
+#include "solve/radial/self_crossings.h"
 
 namespace arapfields {
 
@@ -82,7 +84,13 @@ class ContactTerms {
   std::vector<Index> crossing_surfaces() const {
     return history_ ? history_->sides.crossing_surfaces() : std::vector<Index>();
   }
-  /// Whether a part is inside another one at this shape, however deep, or is pressed flat.
+  /// Where triangles of parts that are kept apart pass through each other at this shape; none without
+  /// self-contact, and where samples know no mesh.
+  std::vector<SelfCrossing> self_crossings(const RowMatrix<double>& coefficients,
+                                           const std::shared_ptr<const Influence>& influence = nullptr);
+  /// Whether there is a mesh for self_crossings().
+  bool sees_crossings() const { return crossings_ && crossings_->knows_mesh(); }
+  /// Whether a part is inside another one at this shape, however deep, is pressed flat, or crosses another.
   bool overlaps(const RowMatrix<double>& coefficients);
 
  private:
@@ -107,7 +115,8 @@ class ContactTerms {
   std::vector<Mat4> obstacle_motions_;  // the motions of its last call
   ContactPoints points_;
   std::optional<SelfContact> self_;
-  std::optional<ContactHistory> history_;  // none: the next search begins anew
+  std::optional<SelfCrossings> crossings_;  // with self_
+  std::optional<ContactHistory> history_;   // none: the next search begins anew
   ContactSet found_;
   Revision sets_ = 0;  // number of contact sets so far
   std::optional<Revision> ended_;

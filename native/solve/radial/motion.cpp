@@ -278,6 +278,7 @@ std::shared_ptr<RadialField> RadialSolver::step(const std::vector<Handle>& moved
     set_motion_state(start);
     throw;
   }
+  s.report.contact.self_intersections.reset();
   s.measure(s.fast);
   s.report.value = s.fast.objective.latest()->value(s.measurements(s.fast), nullptr);
   s.report.seconds = watch.seconds();

@@ -65,6 +65,18 @@ void anchor_lowest_point(RadialState& s) {
   ++s.shape.revision;
 }
 
+/// Fills the report's figures of triangles that pass through each other.
+void count_crossings(RadialState& s) {
+  s.report.contact.self_intersections.reset();
+  if (!s.contact.sees_crossings()) return;
+  const std::vector<SelfCrossing> crossings =
+      s.contact.self_crossings(s.shape.coefficients, s.handles.influence());
+  s.report.contact.self_intersections = std::ssize(crossings);
+  if (!crossings.empty())
+    s.report.contact.intersection =
+        s.problem.frame().to_mesh(crossings.front().place.transpose()).row(0).transpose();
+}
+
 }  // namespace
 
 RadialSolver::RadialSolver(const SurfaceSamples& samples, const std::vector<Handle>& handles,
@@ -183,6 +195,7 @@ std::shared_ptr<RadialField> RadialSolver::solve(Index iterations, double tolera
 const RadialReport& RadialSolver::report() const {
   RadialState& s = *state_;
   const ThreadScope threads(s.problem.solve_threads());
+  if (s.unmeasured != RadialState::Unmeasured::nothing) count_crossings(s);
   if (s.unmeasured == RadialState::Unmeasured::exact) s.measure(s.exact);
   if (s.unmeasured == RadialState::Unmeasured::fast) s.measure(s.fast);
   return s.report;

@@ -159,9 +159,17 @@ bool SelfContact::came_through(Index i, Index j, const Vec3& normal, const Searc
          (last.places.row(i) - last.places.row(j)).dot(normal.transpose()) >= 0.0;
 }
 
-/// Whether a pair of samples is not excluded.
 bool SelfContact::may_meet(Index i, Index j) const {
   return least_gaps_[i] > 0.0 && least_gaps_[j] > 0.0 && is_far(i, j, far_inside) && !is_cut(i, j);
+}
+
+std::vector<bool> SelfContact::beside_others(PointsIn places, double near) const {
+  std::vector<bool> result(static_cast<std::size_t>(places.rows()));
+  const auto near_to = runs_->meeting(places, Points(0, 3), least_gaps_.array() > 0.0, near, facing);
+  for (Index run = 0; run < runs_->count(); ++run)
+    for (const Index i : runs_->samples(run))
+      result[static_cast<std::size_t>(i)] = !near_to[static_cast<std::size_t>(run)].empty();
+  return result;
 }
 
 /// Whether a gap along the normal of sample j makes a pair.

@@ -45,6 +45,11 @@ class SelfContact {
   /// Whether a part is inside another one, however deep, that it is outside of at rest, or is pressed flat
   /// (by winding numbers).
   bool overlaps(PointsIn places, PointsIn normals) const;
+  /// Whether two samples are of parts that are kept apart.
+  bool may_meet(Index i, Index j) const;
+  /// Samples (n) within `near`, in cube units, of one of a part that they are kept apart from, and their
+  /// neighbours.
+  std::vector<bool> beside_others(PointsIn places, double near) const;
   /// The search that a solved shape starts with, in which only shallow negative gaps count.
   Search begin(PointsIn places, const Normals& normals);
 
@@ -55,7 +60,6 @@ class SelfContact {
                                  Penetrations penetrations, const Search& last = {});
   bool is_far(Index i, Index j, double distance) const;
   bool is_cut(Index i, Index j) const;
-  bool may_meet(Index i, Index j) const;
   bool came_through(Index i, Index j, const Vec3& normal, const Search& last) const;
   bool is_gap(double gap, Index i, Index j, const Vec3& normal, Penetrations penetrations,
               const Search& last) const;
