@@ -50,8 +50,7 @@ For deform, stylize and LiveDeformer. Handles whose targets lie beyond give way:
           "`up` (3,) is z unless given. `itself`: parts do not pass each other, but for what touches or "
           "overlaps at rest. `friction`: Coulomb's coefficient at obstacles and the ground, in step() alone.")
       .def_property_readonly(
-          "obstacles", [](const Contact& self) { return py::tuple(py::cast(self.obstacles)); },
-          "The Obstacles.")
+          "obstacles", [](const Contact& self) { return self.obstacles; }, "The Obstacles.")
       .def_readonly("up", &Contact::up, "(3,) the direction in which the ground's height counts.")
       .def_readonly("friction", &Contact::friction, "Coulomb's coefficient at obstacles and the ground.")
       .def_readonly("itself", &Contact::itself, "Whether parts of the shape do not pass each other.")

@@ -195,7 +195,8 @@ def test_the_stub_says_any_only_where_anything_is_meant():
     vague = [(where, what) for where, what in annotations() if "Any" in what and where not in allowed]
     assert not vague
     loose = ("tuple", "dict", "list", "numpy.ndarray")
-    assert not [where for where, what in annotations() if what in loose]
+    pickling = ("__getstate__", "__setstate__", "__deepcopy__")  # Python's own protocol, of any contents
+    assert not [w for w, what in annotations() if what in loose and not w.startswith(pickling)]
 
 
 def test_the_styles_of_the_stub_are_those_that_there_are():

@@ -7,6 +7,7 @@ Samples, object styles and what a plane's solver gives have states of their own 
 import copyreg
 import functools
 import tempfile
+from collections.abc import Callable, Sized
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -76,9 +77,12 @@ def function_of(kind: Any, frame: Any) -> Any:
     return function
 
 
-def python_function(item: ImplicitFunction, _protocol: int = 2) -> tuple[object, ...]:
-    """An object of a subclass of ImplicitFunction by its frame and attributes."""
-    return function_of, (type(item), item.frame), dict(getattr(item, "__dict__", {})) or None
+def python_function(
+    item: ImplicitFunction, _protocol: int = 2
+) -> tuple[Callable[[], ImplicitFunction], tuple[()], Sized | None]:
+    """An object of a subclass of ImplicitFunction by its frame; its attributes are the state."""
+    make = functools.partial(function_of, type(item), item.frame)
+    return make, (), dict(getattr(item, "__dict__", {})) or None
 
 
 def prepared(item: Any) -> tuple[Any, tuple[Any]]:
