@@ -87,15 +87,21 @@ void bind_fields(py::module_& module) {
       .def("__call__", &values, "points"_a, "Deformed positions (p, 3) of points (p, 3).")
       .def(
           "apply",
-          [](const DeformationField& field, const ArrayArgument& points, double strength) {
+          [](const DeformationField& field, const ArrayArgument& points, double strength,
+             const std::optional<ArrayArgument>& triangles) {
             const Points mesh = as_points(points, "points");
-            return run_long([&] { return apply_field(field, mesh, strength); });
+            const auto faces =
+                triangles ? std::optional<Triangles>(as_triangles(*triangles, "triangles")) : std::nullopt;
+            return run_long([&] { return apply_field(field, mesh, strength, faces ? &*faces : nullptr); });
           },
-          "points"_a, py::kw_only(), "strength"_a = 1.0,
+          "points"_a, py::kw_only(), "strength"_a = 1.0, "triangles"_a = py::none(),
           R"(
 The field at another mesh of the same shape, of any resolution or topology: (p, 3).
 
-`strength` scales the displacement. InvalidInput where more than a tenth of the points lie outside the body's
+`strength` scales the displacement. With `triangles` (m, 3) the points are a mesh's vertices: where its parts
+touch at rest, as closed lips or neighbouring fingers do, each vertex moves with the part that it belongs to.
+Without them, and in calls of the field itself, a point takes the side of the nearest point of the surface that
+the field was solved on. InvalidInput where more than a tenth of the points lie outside the body's
 box and farther from its surface than 0.1 of its size.)")
       .def("jacobian", &jacobian, "points"_a, "(p, 3, 3): [:, i, j] = ∂f_i/∂x_j.")
       .def("hessian", &hessian, "points"_a, "(p, 3, 3, 3): [:, i, j, k] = ∂²f_i/∂x_j∂x_k (1/length).")

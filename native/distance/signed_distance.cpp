@@ -15,6 +15,7 @@
 #include "distance/is_closed.h"
 #include "distance/kernels.h"
 #include "distance/morton.h"
+#include "distance/segments.h"
 #include "distance/triangle_packet.h"
 #include "mesh/triangle_mesh.h"
 
@@ -237,6 +238,24 @@ void SignedDistance::winding_number(PointsIn points, Eigen::Ref<Vector> numbers,
         winding(view, block.points.data(), block.count, opening_of_numbers, values.data(), nullptr));
     for (int i = 0; i < block.count; ++i) numbers[block.rows[i]] = values[i];
   });
+}
+
+Vector SignedDistance::first_crossings(PointsIn from, PointsIn to, const std::vector<std::int32_t>& labels,
+                                       const std::vector<std::int32_t>& own_labels,
+                                       const Progress& progress) const {
+  const Hierarchy& hierarchy = parts_->hierarchy;
+  require_usable(from, hierarchy);
+  require_usable(to, hierarchy);
+  Vector result(from.rows());
+  const std::int32_t* const of_triangles = own_labels.empty() ? nullptr : labels.data();
+  parallel_for(0, from.rows(), block_size, [&](Index begin, Index end) {
+    progress.check();
+    for (Index i = begin; i < end; ++i)
+      result[i] = first_crossing(hierarchy.view(), hierarchy.normalized(from.row(i).transpose()),
+                                 hierarchy.normalized(to.row(i).transpose()), of_triangles,
+                                 own_labels.empty() ? 0 : own_labels[static_cast<std::size_t>(i)]);
+  });
+  return result;
 }
 
 Vector signed_distance(PointsIn vertices, TrianglesIn triangles, PointsIn points, int threads,
