@@ -34,7 +34,7 @@ def rows_of(field, local_to_solve, strength=1.0):
     if "nodes" in arrays:
         slopes = arrays["slopes"].reshape(-1, 3, 3)
         values = arrays["values"] - np.einsum("nki,ni->nk", slopes, arrays["nodes"])
-        scale = 1.0 / arrays["widths"] ** 2
+        scale = 1.0 / arrays["width"] ** 2
         parts.append(rows(NODE, arrays["nodes"], scale, map=affine_map(slopes, values)))
     if "places" in arrays:
         inside = arrays.get("embedded_places", 0.0)

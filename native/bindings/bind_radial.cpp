@@ -164,7 +164,7 @@ py::typing::Dict<py::str, FieldArray> arrays_of(const RadialField& field) {
     const InteriorEmbedding& embedding = *basis.embedding;
     arrays["embedded"] = basis.embedded, arrays["nodes"] = embedding.nodes;
     arrays["values"] = embedding.values, arrays["slopes"] = embedding.slopes;
-    arrays["widths"] = embedding.widths;
+    arrays["width"] = Vector::Constant(1, embedding.width);
   }
   if (field.influence()) {
     arrays["places"] = field.influence()->places(), arrays["reaches"] = field.influence()->reaches();

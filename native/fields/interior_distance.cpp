@@ -22,18 +22,16 @@ constexpr double sheet_spacings = 2.5, sheet_cosine = 0.3;
 
 }  // namespace
 
-InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, const Vector& spacings,
-                             const MayJoin& may_join)
+InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing, const MayJoin& may_join)
     : edges_(nodes.rows()) {
   const double extent = (nodes.colwise().maxCoeff() - nodes.colwise().minCoeff()).maxCoeff();
   const Vector radii = inner_radii(nodes, normals, nodes, normals, {.most = extent});
   const Points centers = nodes - radii.asDiagonal() * normals;
-
+  const double near = sheet_spacings * spacing;
   parallel_for(0, nodes.rows(), 32, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i)
       for (Index j = 0; j < nodes.rows(); ++j) {
         if (i == j) continue;
-        const double near = sheet_spacings * 0.5 * (spacings[i] + spacings[j]);
         const double square = (nodes.row(i) - nodes.row(j)).squaredNorm();
         const double larger = std::max(radii[i], radii[j]), smaller = std::min(radii[i], radii[j]);
         const double limit = larger + overlap_share * smaller;

@@ -25,11 +25,9 @@ class InteriorGraph {
     float length;
   };
 
-  /// Nodes (n,3), their outward unit normals (n,3), and the spacing of neighbours, or that at each node (n);
-  /// `may_join`: whether an edge may join two nodes; none: always.
-  InteriorGraph(PointsIn nodes, PointsIn normals, const Vector& spacings, const MayJoin& may_join = {});
-  InteriorGraph(PointsIn nodes, PointsIn normals, double spacing, const MayJoin& may_join = {})
-      : InteriorGraph(nodes, normals, Vector(Vector::Constant(nodes.rows(), spacing)), may_join) {}
+  /// Nodes (n,3), their outward unit normals (n,3), and the spacing of neighbours; `may_join`: whether an
+  /// edge may join two nodes; none: always.
+  InteriorGraph(PointsIn nodes, PointsIn normals, double spacing, const MayJoin& may_join = {});
   Index size() const { return static_cast<Index>(edges_.size()); }
   const std::vector<Edge>& edges(Index node) const { return edges_[node]; }
   /// Lengths (n, sources) of the shortest paths from the first `sources` nodes.

@@ -109,11 +109,9 @@ RowMatrix<double> fitted_slopes(const Points& nodes, const Points& values, const
 
 /// Projects nodes near the plane onto it and inserts the reflection of each other node after it; returns the
 /// twin of each node.
-std::vector<Index> add_reflections(Points& nodes, Points& normals, Vector& widths, int axis) {
+std::vector<Index> add_reflections(Points& nodes, Points& normals, int axis, double width) {
   constexpr double node_on_plane = 0.25;
   const Points places = nodes, directions = normals;
-  const Vector own_widths = widths;
-  widths.resize(2 * places.rows());
   nodes.resize(2 * places.rows(), 3);
   normals.resize(2 * places.rows(), 3);
   std::vector<Index> twins;
@@ -121,10 +119,9 @@ std::vector<Index> add_reflections(Points& nodes, Points& normals, Vector& width
   for (Index i = 0; i < places.rows(); ++i) {
     Eigen::RowVector3d flat = directions.row(i);
     flat[axis] = 0.0;
-    const bool on_plane = places(i, axis) < node_on_plane * own_widths[i] && flat.norm() > 0.5;
+    const bool on_plane = places(i, axis) < node_on_plane * width && flat.norm() > 0.5;
     for (int k = 0; k < (on_plane ? 1 : 2); ++k) {
       nodes.row(count + k) = places.row(i);
-      widths[count + k] = own_widths[i];
       normals.row(count + k) = on_plane ? Eigen::RowVector3d(flat.normalized()) : directions.row(i);
       nodes(count + k, axis) *= on_plane ? 0.0 : (k == 0 ? 1.0 : -1.0);
       if (!on_plane && k == 1) normals(count + k, axis) *= -1.0;
@@ -134,7 +131,6 @@ std::vector<Index> add_reflections(Points& nodes, Points& normals, Vector& width
   }
   nodes.conservativeResize(count, 3);
   normals.conservativeResize(count, 3);
-  widths.conservativeResize(count);
   return twins;
 }
 
@@ -157,18 +153,15 @@ void symmetrise(InteriorEmbedding& embedding, const std::vector<Index>& twins, i
   }
 }
 
-InsideSight::Eyes eyes_of(PointsIn points, PointsIn normals, const Vector& widths, const InsideSight& mesh) {
-  return mesh.below(points, normals, eye_widths * widths);
+InsideSight::Eyes eyes_of(PointsIn points, PointsIn normals, double width, const InsideSight& mesh) {
+  return mesh.below(points, normals, Vector::Constant(points.rows(), eye_widths * width));
 }
 
 }  // namespace
 
-void NodeSight::set_places(PointsIn places, std::vector<SurfaceSide> sides, const Vector& widths) {
+void NodeSight::set_places(PointsIn places, std::vector<SurfaceSide> sides) {
   places_ = places;
   sides_ = std::move(sides);
-  reaches_.resize(places_.rows());
-  for (Index i = 0; i < places_.rows(); ++i)
-    reaches_[i] = sight_widths * widths[sides_[static_cast<std::size_t>(i)]];
   nearest_ = places_.rows() > 0 ? std::make_shared<const SignedDistance>(nearest_samples(places_)) : nullptr;
 }
 
@@ -177,9 +170,8 @@ std::vector<SurfaceSide> NodeSight::sides_near(PointsIn points) const {
   if (!nearest_ || points.rows() == 0) return result;
   const ClosestPoints closest = nearest_->closest(points);
   for (std::size_t i = 0; i < result.size(); ++i)
-    if (const auto k = static_cast<std::size_t>(closest.triangles[i]);
-        closest.distances[static_cast<Index>(i)] < reaches_[static_cast<Index>(k)])
-      result[i] = sides_[k];
+    if (closest.distances[static_cast<Index>(i)] < reach)
+      result[i] = sides_[static_cast<std::size_t>(closest.triangles[i])];
   return result;
 }
 
@@ -188,8 +180,8 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
   constexpr Index block = embedding_block;
   const Index count = points.rows(), n = nodes.rows();
   RowMatrix<double> rows(n, embedding_row);
-  rows << nodes, values, slopes, widths.array().square().inverse().matrix();
-
+  rows << nodes, values, slopes;
+  const double scale = 1.0 / (width * width);
   const int columns_count = columns(out.order);
   std::vector<SurfaceSide> found;
   if (sight && sides == nullptr) found = sight->sides_near(points), sides = &found;
@@ -206,13 +198,13 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
       const double radius = std::sqrt((part.rowwise() - center).rowwise().squaredNorm().maxCoeff());
       for (Index i = 0; i < block; ++i)
         for (int k = 0; k < 3; ++k) packed[k * block + i] = part(std::min(i, valid - 1), k);
-      // In widths of a node: the largest distance of a point of the block to its nearest node.
-      double farthest_nearest = 1e300;
+      double nearest = 1e300;
       for (Index j = 0; j < n; ++j) {
         const double a = nodes(j, 0) - center[0], c = nodes(j, 1) - center[1], d = nodes(j, 2) - center[2];
         distance[j] = std::sqrt(a * a + c * c + d * d);
-        farthest_nearest = std::min(farthest_nearest, (distance[j] + radius) / widths[j]);
+        nearest = std::min(nearest, distance[j]);
       }
+      double farthest_nearest = nearest + radius;
       bool hides = false;  // whether a point of the block does not see some node
       const auto side_of = [&](Index i) {
         return sight ? (*sides)[static_cast<std::size_t>(b * block + std::min(i, valid - 1))]
@@ -221,13 +213,13 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
       for (Index i = 0; sight && i < valid; ++i)
         if (const SurfaceSide side = side_of(i); side >= 0) {
           hides = hides || sight->starts[side] < sight->starts[side + 1];
-          farthest_nearest =
-              std::max(farthest_nearest, (part.row(i) - nodes.row(side)).norm() / widths[side]);
+          farthest_nearest = std::max(farthest_nearest, (part.row(i) - nodes.row(side)).norm());
         }
-      const double cutoff = std::sqrt(farthest_nearest * farthest_nearest - negligible);
+      const double cutoff =
+          std::sqrt(farthest_nearest * farthest_nearest - negligible * width * width) + radius;
       Index near_count = 0;
       for (Index j = 0; j < n; ++j)
-        if (distance[j] <= cutoff * widths[j] + radius) near[near_count++] = static_cast<std::int32_t>(j);
+        if (distance[j] <= cutoff) near[near_count++] = static_cast<std::int32_t>(j);
       if (hides) {
         excess.assign(static_cast<std::size_t>(near_count * block), 0.0);
         for (Index a = 0; a < near_count; ++a) slots[near[a]] = a;
@@ -240,8 +232,8 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
         }
         for (Index a = 0; a < near_count; ++a) slots[near[a]] = -1;
       }
-      const EmbeddingBlock embedding_block_data{packed.data(), rows.data(), near.data(), near_count,
-                                                hides ? excess.data() : nullptr};
+      const EmbeddingBlock embedding_block_data{packed.data(), rows.data(), near.data(),
+                                                near_count,    scale,       hides ? excess.data() : nullptr};
       ARAPFIELDS_DISPATCH(embedding_jets(embedding_block_data, columns_count, jets.data()));
       for (int c = 0; c < columns_count; ++c)
         for (Index p = 0; p < valid; ++p)
@@ -255,19 +247,18 @@ namespace {
 /// For each point (n,3) of a surface, with its normal, the nearest of the nodes that it sees.
 struct SeenNodes {
   std::vector<Index> nodes;  ///< where a point sees none of those tried: the nearest one with a like normal
-  Vector distances;          ///< in widths of the node; infinity there
+  Vector distances;          ///< infinity there
 };
 
-SeenNodes nearest_seen(PointsIn points, PointsIn normals, PointsIn nodes, PointsIn node_normals,
-                       const Vector& widths, const InsideSight& mesh) {
+SeenNodes nearest_seen(PointsIn points, PointsIn normals, PointsIn nodes, PointsIn node_normals, double width,
+                       const InsideSight& mesh) {
   const Index count = points.rows(), tried = std::min(most_tried, nodes.rows());
   std::vector<Index> candidates(static_cast<std::size_t>(count * tried));
   parallel_for(0, count, 64, [&](Index first, Index last) {
     std::vector<Index> order(static_cast<std::size_t>(nodes.rows()));
     Vector squares(nodes.rows());
     for (Index i = first; i < last; ++i) {
-      for (Index j = 0; j < nodes.rows(); ++j)
-        squares[j] = (nodes.row(j) - points.row(i)).squaredNorm() / (widths[j] * widths[j]);
+      for (Index j = 0; j < nodes.rows(); ++j) squares[j] = (nodes.row(j) - points.row(i)).squaredNorm();
       std::iota(order.begin(), order.end(), Index{0});
       std::partial_sort(order.begin(), order.begin() + tried, order.end(), [&](Index a, Index c) {
         return squares[a] != squares[c] ? squares[a] < squares[c] : a < c;
@@ -275,10 +266,8 @@ SeenNodes nearest_seen(PointsIn points, PointsIn normals, PointsIn nodes, Points
       std::copy_n(order.begin(), tried, candidates.begin() + i * tried);
     }
   });
-  Vector depths(count);  // of the width of the nearest node
-  for (Index i = 0; i < count; ++i) depths[i] = widths[candidates[i * tried]];
-  const InsideSight::Eyes from = eyes_of(points, normals, depths, mesh),
-                          to = eyes_of(nodes, node_normals, widths, mesh);
+  const InsideSight::Eyes from = eyes_of(points, normals, width, mesh),
+                          to = eyes_of(nodes, node_normals, width, mesh);
   SeenNodes result{std::vector<Index>(static_cast<std::size_t>(count)),
                    Vector::Constant(count, std::numeric_limits<double>::infinity())};
   std::vector<Index> left(static_cast<std::size_t>(count));
@@ -295,7 +284,7 @@ SeenNodes nearest_seen(PointsIn points, PointsIn normals, PointsIn nodes, Points
         continue;
       }
       result.nodes[i] = node;
-      result.distances[i] = (nodes.row(node) - points.row(i)).norm() / widths[node];
+      result.distances[i] = (nodes.row(node) - points.row(i)).norm();
     }
     left = std::move(next);
   }
@@ -312,37 +301,33 @@ SeenNodes nearest_seen(PointsIn points, PointsIn normals, PointsIn nodes, Points
 /// Rows of the samples that are farther than a width from all nodes that they see, among those near marked
 /// nodes, chosen so that each of them sees a node within the width: two walls that face each other need nodes
 /// of their own.
-std::vector<Index> unseen_samples(PointsIn samples, PointsIn normals, const Vector& widths,
-                                  const std::vector<Index>& chosen, const std::vector<bool>& marked,
-                                  const InsideSight& mesh) {
+std::vector<Index> unseen_samples(PointsIn samples, PointsIn normals, const std::vector<Index>& chosen,
+                                  const std::vector<bool>& marked, double width, const InsideSight& mesh) {
   std::vector<Index> near;
   for (Index i = 0; i < samples.rows(); ++i)
     for (std::size_t k = 0; k < chosen.size(); ++k)
-      if (const double reach = 2.0 * widths[chosen[k]];
-          marked[k] && (samples.row(chosen[k]) - samples.row(i)).squaredNorm() < reach * reach) {
+      if (marked[k] && (samples.row(chosen[k]) - samples.row(i)).squaredNorm() < 4.0 * width * width) {
         near.push_back(i);
         break;
       }
   const Points places = samples(near, Eigen::all), directions = normals(near, Eigen::all);
-  const Vector own_widths = widths(near);
-  Vector distances = nearest_seen(places, directions, samples(chosen, Eigen::all),
-                                  normals(chosen, Eigen::all), widths(chosen), mesh)
-                         .distances;
-  const InsideSight::Eyes eyes = eyes_of(places, directions, own_widths, mesh);
+  Vector distances =
+      nearest_seen(places, directions, samples(chosen, Eigen::all), normals(chosen, Eigen::all), width, mesh)
+          .distances;
+  const InsideSight::Eyes eyes = eyes_of(places, directions, width, mesh);
   std::vector<Index> added;
   for (Index farthest = 0; !near.empty() && std::ssize(added) < most_nodes / 2;) {
-    if (!(distances.maxCoeff(&farthest) > 1.0)) break;
+    if (!(distances.maxCoeff(&farthest) > width)) break;
     added.push_back(near[farthest]);
     distances[farthest] = 0.0;
-    const double width = own_widths[farthest];
     std::vector<std::pair<Index, Index>> pairs;
     for (Index i = 0; i < places.rows(); ++i)
-      if (distances[i] > 1.0 && (places.row(i) - places.row(farthest)).squaredNorm() < width * width)
+      if (distances[i] > width && (places.row(i) - places.row(farthest)).squaredNorm() < width * width)
         pairs.emplace_back(farthest, i);
     const std::vector<bool> seen = mesh.see(eyes, eyes, pairs);
     for (std::size_t k = 0; k < pairs.size(); ++k)
       if (const Index i = pairs[k].second; seen[k])
-        distances[i] = (places.row(i) - places.row(farthest)).norm() / width;
+        distances[i] = (places.row(i) - places.row(farthest)).norm();
   }
   return added;
 }
@@ -356,18 +341,19 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(PointsIn points, PointsIn n
   std::vector<Index> hiding;  // nodes that do not see all others
   for (Index i = 0; i < nodes.rows(); ++i)
     if (sight->starts[i] < sight->starts[i + 1]) hiding.push_back(i);
+  const double near = sight->reach * sight->reach;
   std::vector<char> matters(result.size());
   parallel_for(0, points.rows(), 256, [&](Index first, Index last) {
     for (Index p = first; p < last; ++p)
       for (std::size_t k = 0; k < hiding.size() && matters[p] == 0; ++k)
-        matters[p] = (nodes.row(hiding[k]) - points.row(p)).norm() < sight_widths * widths[hiding[k]];
+        matters[p] = (nodes.row(hiding[k]) - points.row(p)).squaredNorm() < near;
   });
   std::vector<Index> some;
   for (Index p = 0; p < points.rows(); ++p)
     if (matters[p] != 0) some.push_back(p);
   if (some.empty()) return result;
   const SeenNodes seen =
-      nearest_seen(points(some, Eigen::all), normals(some, Eigen::all), nodes, sight->normals, widths, mesh);
+      nearest_seen(points(some, Eigen::all), normals(some, Eigen::all), nodes, sight->normals, width, mesh);
   for (std::size_t k = 0; k < some.size(); ++k) result[some[k]] = static_cast<SurfaceSide>(seen.nodes[k]);
   return result;
 }
@@ -381,34 +367,33 @@ namespace {
 
 /// Marks the nodes near which parts of the shape nearly touch.
 std::vector<bool> near_other_parts(const Points& nodes, const Points& normals, PointsIn samples,
-                                   PointsIn sample_normals, const Vector& widths) {
+                                   PointsIn sample_normals, double width) {
+  const double near = facing_widths * width;
   std::vector<char> faces(static_cast<std::size_t>(nodes.rows()));
   parallel_for(0, nodes.rows(), 32, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i)
       for (Index j = 0; j < samples.rows() && faces[i] == 0; ++j) {
-        const double width = widths[i], near = facing_widths * width;
         const Eigen::RowVector3d way = samples.row(j) - nodes.row(i);
         faces[i] = way.squaredNorm() < near * near && way.dot(normals.row(i)) > -facing_behind * width &&
                    normals.row(i).dot(sample_normals.row(j)) < facing_cosine;
       }
   });
   std::vector<bool> result(faces.size());
+  const double reach = sight_widths * width;
   for (Index i = 0; i < nodes.rows(); ++i)
     for (Index j = 0; j < nodes.rows() && !result[i]; ++j)
-      result[i] = faces[j] != 0 && (nodes.row(i) - nodes.row(j)).norm() < sight_widths * widths[i];
+      result[i] = faces[j] != 0 && (nodes.row(i) - nodes.row(j)).squaredNorm() < reach * reach;
   return result;
 }
 
 /// Pairs of nodes, near each other, that do not see each other: a list for each node.
-Neighbours hidden_pairs(const Points& nodes, const Points& normals, const Vector& widths,
-                        const InsideSight& mesh) {
+Neighbours hidden_pairs(const Points& nodes, const Points& normals, double width, const InsideSight& mesh) {
+  const double reach = sight_widths * width;
   std::vector<std::pair<Index, Index>> pairs;
   for (Index i = 0; i < nodes.rows(); ++i)
     for (Index j = i + 1; j < nodes.rows(); ++j)
-      if (const double reach = sight_widths * std::max(widths[i], widths[j]);
-          (nodes.row(i) - nodes.row(j)).squaredNorm() < reach * reach)
-        pairs.emplace_back(i, j);
-  const InsideSight::Eyes eyes = eyes_of(nodes, normals, widths, mesh);
+      if ((nodes.row(i) - nodes.row(j)).squaredNorm() < reach * reach) pairs.emplace_back(i, j);
+  const InsideSight::Eyes eyes = eyes_of(nodes, normals, width, mesh);
   const std::vector<bool> seen = mesh.see(eyes, eyes, pairs);
   Neighbours hidden(static_cast<std::size_t>(nodes.rows()));
   for (std::size_t k = 0; k < pairs.size(); ++k)
@@ -419,17 +404,15 @@ Neighbours hidden_pairs(const Points& nodes, const Points& normals, const Vector
 }
 
 /// Takes into the sight the interior distances of the pairs that do not see each other.
-void measure(const InteriorGraph& graph, const Points& nodes, const Neighbours& hidden, const Vector& widths,
+void measure(const InteriorGraph& graph, const Points& nodes, const Neighbours& hidden, double width,
              NodeSight& sight) {
+  const auto longest = static_cast<float>(longest_widths * width);
   std::vector<std::vector<double>> excess(hidden.size());
   parallel_for(0, nodes.rows(), 8, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i) {
       if (hidden[i].empty()) continue;
       std::vector<float> start(hidden.size(), std::numeric_limits<float>::infinity());
       start[i] = 0.0f;
-      double widest = widths[i];
-      for (const Index j : hidden[i]) widest = std::max(widest, widths[j]);
-      const auto longest = static_cast<float>(longest_widths * widest);
       const std::vector<float> lengths = graph.distances_from(std::move(start), longest);
       for (const Index j : hidden[i]) {
         const double inside = detour * std::min(lengths[j], longest);
@@ -451,16 +434,14 @@ void measure(const InteriorGraph& graph, const Points& nodes, const Neighbours& 
 }  // namespace
 
 std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals, int axis,
-                                                      const Vector& sizes, const MayJoin& may_join,
-                                                      const MakeSight& make_sight) {
+                                                      const MayJoin& may_join, const MakeSight& make_sight) {
   if (samples.rows() < least_nodes || normals.rows() != samples.rows()) return nullptr;
   const Index most = axis < 0 ? most_nodes : most_nodes / 2;
-  const FarthestPoints chosen = farthest_points(samples, std::min<Index>(most, samples.rows()), sizes);
+  const FarthestPoints chosen = farthest_points(samples, std::min<Index>(most, samples.rows()));
   if (static_cast<Index>(chosen.indices.size()) < least_nodes || !(chosen.fill_distance > 0.0))
     return nullptr;
   InteriorEmbedding embedding;
-  const Vector sample_widths =
-      chosen.fill_distance * (sizes.size() > 0 ? sizes : Vector(Vector::Ones(samples.rows())));
+  embedding.width = chosen.fill_distance;
   // Where parts of the shape nearly touch, no edge of the graph crosses the surface.
   std::vector<Index> rows = chosen.indices;
   std::shared_ptr<const InsideSight> mesh;
@@ -475,18 +456,17 @@ std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn
       other_normals.col(axis).tail(samples.rows()) *= -1.0;
     }
     const std::vector<bool> marked = near_other_parts(samples(rows, Eigen::all), normals(rows, Eigen::all),
-                                                      others, other_normals, sample_widths(rows));
+                                                      others, other_normals, embedding.width);
     if (std::find(marked.begin(), marked.end(), true) != marked.end()) mesh = make_sight();
     if (mesh) {
-      const std::vector<Index> added = unseen_samples(samples, normals, sample_widths, rows, marked, *mesh);
+      const std::vector<Index> added = unseen_samples(samples, normals, rows, marked, embedding.width, *mesh);
       rows.insert(rows.end(), added.begin(), added.end());
     }
   }
   embedding.nodes = samples(rows, Eigen::all);
-  embedding.widths = sample_widths(rows);
   Points node_normals = normals(rows, Eigen::all);
   std::vector<Index> twins;
-  if (axis >= 0) twins = add_reflections(embedding.nodes, node_normals, embedding.widths, axis);
+  if (axis >= 0) twins = add_reflections(embedding.nodes, node_normals, axis, embedding.width);
   const Index n = embedding.nodes.rows();
   // Landmarks are the first nodes, in complete mirrored pairs.
   const Index count = landmarks + (axis >= 0 && twins[landmarks - 1] == landmarks ? 1 : 0);
@@ -494,18 +474,18 @@ std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn
   Neighbours hidden;
   if (mesh) {
     embedding.sight = std::make_shared<NodeSight>();
-
+    embedding.sight->reach = sight_widths * embedding.width;
     embedding.sight->normals = node_normals;
-    hidden = hidden_pairs(embedding.nodes, node_normals, embedding.widths, *mesh);
+    hidden = hidden_pairs(embedding.nodes, node_normals, embedding.width, *mesh);
   }
   const MayJoin nodes_may_join = [&](Index i, Index j) {
     return (!may_join || rows_may_join(i, j)) &&
            (hidden.empty() || !std::binary_search(hidden[i].begin(), hidden[i].end(), j));
   };
-  const InteriorGraph graph(embedding.nodes, node_normals, embedding.widths,
+  const InteriorGraph graph(embedding.nodes, node_normals, embedding.width,
                             may_join || mesh ? nodes_may_join : MayJoin());
   if (embedding.sight) {
-    measure(graph, embedding.nodes, hidden, embedding.widths, *embedding.sight);
+    measure(graph, embedding.nodes, hidden, embedding.width, *embedding.sight);
     if (embedding.sight->others.empty()) embedding.sight = nullptr;
   }
   RowMatrix<double> excess = (detour * graph.distances(count)).array().square();
@@ -515,11 +495,10 @@ std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn
           std::max(0.0, excess(i, l) - (embedding.nodes.row(i) - embedding.nodes.row(l)).squaredNorm());
   embedding.values = std::sqrt(emphasis) * leading_coordinates(excess);
   Neighbours neighbours(n);
-
+  const float cutoff = static_cast<float>(neighbour_spacings * embedding.width);
   for (Index i = 0; i < n; ++i)
     for (const InteriorGraph::Edge& edge : graph.edges(i))
-      if (edge.length < neighbour_spacings * 0.5 * (embedding.widths[i] + embedding.widths[edge.to]))
-        neighbours[i].push_back(edge.to);
+      if (edge.length < cutoff) neighbours[i].push_back(edge.to);
   embedding.values = smoothed(embedding.values, neighbours);
   const double size =
       (embedding.nodes.colwise().maxCoeff() - embedding.nodes.colwise().minCoeff()).maxCoeff();

@@ -25,12 +25,11 @@ struct ARAPFIELDS_EXPORT NodeSight {
   /// square by which its interior distance exceeds the straight one.
   std::vector<std::int32_t> starts, others;
   std::vector<double> excess;
-
+  double reach = 0.0;             ///< distance up to which nodes are listed
   Points normals = Points(0, 3);  ///< (n,3) of the nodes, unit length
 
-  /// Points of the surface whose side is known, for queries that know nothing but their position; `widths`:
-  /// those of the nodes.
-  void set_places(PointsIn places, std::vector<SurfaceSide> sides, const Vector& widths);
+  /// Points of the surface whose side is known, for queries that know nothing but their position.
+  void set_places(PointsIn places, std::vector<SurfaceSide> sides);
   const Points& places() const { return places_; }
   const std::vector<SurfaceSide>& sides() const { return sides_; }
   /// The sides (n) of points (n,3): those of the nearest places.
@@ -39,21 +38,20 @@ struct ARAPFIELDS_EXPORT NodeSight {
  private:
   Points places_ = Points(0, 3);
   std::vector<SurfaceSide> sides_;
-  Vector reaches_;  // how far from the places their sides count
   std::shared_ptr<const SignedDistance> nearest_;
 };
 
 /// An embedding ψ that separates parts which are near in space but far apart inside the shape:
 /// |x − y|² + |ψ(x) − ψ(y)|² approximates the squared interior distance from x to y. ψ is given by values and
-/// gradients at nodes of the surface and blended between them with normalised Gaussian weights, each as wide
-/// as the nodes' spacing there (Franke and Little's modification of Shepard's method). In the weights, a node
-/// that a point's side does not see counts by its interior distance: ψ is a function on the surface, not in
-/// space, and parts that touch at rest have values of their own.
+/// gradients at nodes of the surface and blended between them with normalised Gaussian weights, as wide as
+/// the nodes' spacing (Franke and Little's modification of Shepard's method). In the weights, a node that a
+/// point's side does not see counts by its interior distance: ψ is a function on the surface, not in space,
+/// and parts that touch at rest have values of their own.
 struct ARAPFIELDS_EXPORT InteriorEmbedding {
   Points nodes;                                ///< (n,3)
   Points values;                               ///< (n,3) ψ at the nodes
   RowMatrix<double> slopes;                    ///< (n,9) ∂ψ_k/∂x_i at 3 k + i
-  Vector widths;                               ///< (n) of the Gaussians e^{−|x|²/width²}
+  double width = 0.0;                          ///< of the Gaussians e^{−|x|²/width²}
   std::shared_ptr<NodeSight> sight = nullptr;  ///< null: all nodes that are near see each other
 
   /// Jets of ψ at points (n,3), of any order, each on its side (n); null: on that of the nearest known place.
@@ -71,12 +69,10 @@ using MakeSight = std::function<std::shared_ptr<const InsideSight>()>;
 /// Silva, Tenenbaum 2004) of the squared interior distances minus the squared Euclidean ones. Null if these
 /// hardly differ, and for less than a hundred distinct samples. With an axis (0, 1, 2), samples are those
 /// where that coordinate is positive, whose reflections are added, and ψ is symmetric: interior distances
-/// from x to y and from S x to S y are equal. `sizes` (n; empty: all 1): the
-/// relative spacing of nodes at each sample. `may_join`: whether an edge of the graph may join two samples;
+/// from x to y and from S x to S y are equal. `may_join`: whether an edge of the graph may join two samples;
 /// none: always; without an axis only. `make_sight`: called where parts nearly touch.
 ARAPFIELDS_EXPORT std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals,
                                                                         int axis = -1,
-                                                                        const Vector& sizes = {},
                                                                         const MayJoin& may_join = {},
                                                                         const MakeSight& make_sight = {});
 

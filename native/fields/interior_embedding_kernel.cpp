@@ -9,8 +9,8 @@ namespace {
 using P = Pack<double>;
 constexpr int pairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
 
-/// Sums over nodes of w p and w, with w = e^{−|x − node|²/width²}, the width the node's own, and p the plane
-/// through ψ at the node, and of their derivatives in the order of jets.
+/// Sums over nodes of w p and w, with w = e^{−|x − node|²/width²} and p the plane through ψ at the node, and
+/// of their derivatives in the order of jets.
 template <int columns>
 struct Sums {
   P weight[columns] = {};
@@ -55,7 +55,6 @@ void jets_of(const EmbeddingBlock& block, double* jets) {
       const P d0 = x[0] - node[0], d1 = x[1] - node[1], d2 = x[2] - node[2];
       P square = d0 * d0 + d1 * d1 + d2 * d2;
       if (block.excess != nullptr) square += load(block.excess + embedding_block * a + offset);
-      square *= node[15];
       nearest = square < nearest ? square : nearest;
     }
     Sums<columns> sums;
@@ -64,7 +63,8 @@ void jets_of(const EmbeddingBlock& block, double* jets) {
       const P d[3] = {x[0] - node[0], x[1] - node[1], x[2] - node[2]};
       P square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
       if (block.excess != nullptr) square += load(block.excess + embedding_block * a + offset);
-      add_node<columns>(node, d, exponential<double>(nearest - square * node[15]), 2.0 * node[15], sums);
+      add_node<columns>(node, d, exponential<double>((nearest - square) * block.scale), 2.0 * block.scale,
+                        sums);
     }
     const P inverse = 1.0 / sums.weight[0];
     P out[columns][3];

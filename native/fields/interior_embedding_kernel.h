@@ -9,7 +9,7 @@
 namespace arapfields {
 
 constexpr int embedding_block = 16;  ///< points of a block
-constexpr int embedding_row = 16;    ///< numbers of a node: place, ψ, slopes, 1/width²
+constexpr int embedding_row = 15;    ///< numbers of a node: place, ψ, slopes
 
 /// A block of points (3, 16) and the nodes near it.
 struct EmbeddingBlock {
@@ -17,6 +17,7 @@ struct EmbeddingBlock {
   const double* nodes;
   const std::int32_t* near;
   std::int64_t near_count;
+  double scale;          // 1/width²
   const double* excess;  // (near_count, 16) added to the squared distances; null: nothing
 };
 

@@ -22,8 +22,7 @@ void validate(const InteriorEmbedding& given) {
       "as many values and rows of 9 slopes as nodes are needed, one or more");
   require(given.nodes.allFinite() && given.values.allFinite() && given.slopes.allFinite(), "embedding",
           "NaN or infinity", "finite numbers are needed");
-  require(given.widths.size() == nodes && given.widths.allFinite() && given.widths.minCoeff() > 0.0,
-          "embedding.widths", "some are missing, or not positive", "a positive one for each node is needed");
+  require_positive("embedding.width", given.width);
 }
 
 /// The point farthest from the mean, without outliers.

@@ -83,7 +83,7 @@ class FieldArrays {
     add_rows(prefix + "embedding.nodes", basis.embedding->nodes);
     add_rows(prefix + "embedding.values", basis.embedding->values);
     add_rows(prefix + "embedding.slopes", basis.embedding->slopes);
-    file.add(prefix + "embedding.widths", {basis.embedding->widths.size()}, basis.embedding->widths.data());
+
     if (basis.embedding->sight) add_sight(*basis.embedding->sight, prefix + "embedding.sight.");
   }
   void add_sight(const NodeSight& sight, const std::string& prefix) {
@@ -113,10 +113,11 @@ void add_radial_structure(const RadialField& field, Json& structure) {
   structure["centers"] = field.basis().center_count();
   if (field.influence()) structure["influence"] = field.influence()->places().rows();
   if (const InteriorEmbedding* embedding = field.basis().embedding.get()) {
-    structure["embedding"] = {{"nodes", embedding->nodes.rows()}};
+    structure["embedding"] = {{"nodes", embedding->nodes.rows()}, {"width", embedding->width}};
     if (embedding->sight)
       structure["embedding"]["sight"] = {{"pairs", std::ssize(embedding->sight->others)},
-                                         {"places", embedding->sight->places().rows()}};
+                                         {"places", embedding->sight->places().rows()},
+                                         {"reach", embedding->sight->reach}};
   }
 }
 
@@ -203,10 +204,12 @@ std::vector<std::int32_t> read_rows(ArchiveReader& file, const std::string& name
 }
 
 std::shared_ptr<NodeSight> read_sight(ArchiveReader& file, const JsonObject& object,
-                                      const std::string& prefix, const Vector& widths) {
-  const Index nodes = widths.size(), pairs = object.integer("pairs", 0, INT32_MAX - 1),
+                                      const std::string& prefix, Index nodes) {
+  const Index pairs = object.integer("pairs", 0, INT32_MAX - 1),
               places = object.integer("places", 0, most_rows);
   auto sight = std::make_shared<NodeSight>();
+  sight->reach = object.number("reach");
+  require_positive(object.name("reach"), sight->reach);
   sight->normals = file.points(prefix + "normals", nodes);
   sight->starts = read_rows(file, prefix + "starts", nodes + 1, pairs + 1);
   require(std::is_sorted(sight->starts.begin(), sight->starts.end()) && sight->starts.front() == 0 &&
@@ -218,7 +221,7 @@ std::shared_ptr<NodeSight> read_sight(ArchiveReader& file, const JsonObject& obj
           "none may be negative");
   sight->excess.assign(excess.begin(), excess.end());
   const Points known = file.points(prefix + "places", places);
-  sight->set_places(known, read_rows(file, prefix + "sides", places, nodes), widths);
+  sight->set_places(known, read_rows(file, prefix + "sides", places, nodes));
   return sight;
 }
 
@@ -237,15 +240,11 @@ std::shared_ptr<RadialField> read_radial(ArchiveReader& file, const JsonObject& 
     restored.values = file.points(prefix + "embedding.values", nodes);
     const Vector slopes = file.doubles(prefix + "embedding.slopes", {nodes, 9});
     restored.slopes = Eigen::Map<const RowMatrix<double>>(slopes.data(), nodes, 9);
-    // Before version 3 all nodes had one width.
-    restored.widths = embedding.has("width") ? Vector(Vector::Constant(nodes, embedding.number("width")))
-                                             : file.doubles(prefix + "embedding.widths", {nodes});
-    require(restored.widths.minCoeff() > 0.0, embedding.name("widths"), "some are not positive",
-            "a positive width for each node is needed");
+    restored.width = embedding.number("width");
     if (embedding.has("sight"))
-      restored.sight =
-          read_sight(file, JsonObject(embedding.at("sight"), embedding.name("sight"), {"pairs", "places"}),
-                     prefix + "embedding.sight.", restored.widths);
+      restored.sight = read_sight(
+          file, JsonObject(embedding.at("sight"), embedding.name("sight"), {"pairs", "places", "reach"}),
+          prefix + "embedding.sight.", nodes);
     basis.set_embedding(std::make_shared<const InteriorEmbedding>(std::move(restored)));
   }
   std::shared_ptr<const Influence> influence;

@@ -54,9 +54,8 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
   const MakeSight make_sight = [&] {
     return sight = std::make_shared<const InsideSight>(*samples.mesh, samples.frame, progress);
   };
-  const std::shared_ptr<InteriorEmbedding> made =
-      interior_embedding(sites, normals, axis, layout.sizes, may_join ? sites_may_join : MayJoin(),
-                         samples.mesh ? make_sight : MakeSight());
+  const std::shared_ptr<InteriorEmbedding> made = interior_embedding(
+      sites, normals, axis, may_join ? sites_may_join : MayJoin(), samples.mesh ? make_sight : MakeSight());
   if (made && made->sight) {
     // Samples and vertices know their sides by the mesh; other points take that of the nearest of them.
     const Index count = samples.size(), vertices = samples.mesh->vertices.rows();
@@ -69,7 +68,7 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
     for (Index i = 0; i < places.rows(); ++i)
       if (const SurfaceSide side = sides[static_cast<std::size_t>(i)]; side >= 0)
         near.push_back(i), near_sides.push_back(side);
-    made->sight->set_places(rows_of(places, near), std::move(near_sides), made->widths);
+    made->sight->set_places(rows_of(places, near), std::move(near_sides));
   }
   embedding = made;
 }
