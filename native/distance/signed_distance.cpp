@@ -15,7 +15,6 @@
 #include "distance/is_closed.h"
 #include "distance/kernels.h"
 #include "distance/morton.h"
-#include "distance/segments.h"
 #include "distance/triangle_packet.h"
 #include "mesh/triangle_mesh.h"
 
@@ -247,13 +246,17 @@ Vector SignedDistance::first_crossings(PointsIn from, PointsIn to, const std::ve
   require_usable(from, hierarchy);
   require_usable(to, hierarchy);
   Vector result(from.rows());
-  const std::int32_t* const of_triangles = own_labels.empty() ? nullptr : labels.data();
+  const HierarchyView view = hierarchy.view();
   parallel_for(0, from.rows(), block_size, [&](Index begin, Index end) {
     progress.check();
-    for (Index i = begin; i < end; ++i)
-      result[i] = first_crossing(hierarchy.view(), hierarchy.normalized(from.row(i).transpose()),
-                                 hierarchy.normalized(to.row(i).transpose()), of_triangles,
-                                 own_labels.empty() ? 0 : own_labels[static_cast<std::size_t>(i)]);
+    Points starts(end - begin, 3), ends(end - begin, 3);
+    for (Index i = begin; i < end; ++i) {
+      starts.row(i - begin) = hierarchy.normalized(from.row(i).transpose()).transpose();
+      ends.row(i - begin) = hierarchy.normalized(to.row(i).transpose()).transpose();
+    }
+    ARAPFIELDS_DISPATCH(first_crossings(
+        view, starts.data(), ends.data(), end - begin, own_labels.empty() ? nullptr : labels.data(),
+        own_labels.empty() ? nullptr : own_labels.data() + begin, result.data() + begin));
   });
   return result;
 }

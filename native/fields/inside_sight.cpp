@@ -21,12 +21,17 @@ InsideSight::InsideSight(const TriangleMesh& mesh, const Frame& frame, const Pro
   const std::vector<Index> pieces = WeldedVertices(mesh).pieces(mesh);
   for (Index t = 0; t < mesh.triangles.rows(); ++t)
     piece_of_triangle_.push_back(static_cast<std::int32_t>(pieces[mesh.triangles(t, 0)]));
+  is_one_piece_ = std::all_of(piece_of_triangle_.begin(), piece_of_triangle_.end(),
+                              [&](std::int32_t piece) { return piece == piece_of_triangle_.front(); });
 }
 
 InsideSight::Eyes InsideSight::below(PointsIn points, PointsIn normals, const Vector& depths) const {
   Eyes result{points, {}};
-  for (const std::int32_t triangle : distance_.closest(points).triangles)
-    result.pieces.push_back(piece_of_triangle_[static_cast<std::size_t>(triangle)]);
+  if (is_one_piece_)
+    result.pieces.assign(static_cast<std::size_t>(points.rows()), piece_of_triangle_.front());
+  else
+    for (const std::int32_t triangle : distance_.closest(points).triangles)
+      result.pieces.push_back(piece_of_triangle_[static_cast<std::size_t>(triangle)]);
   const double start = below_own_face * size_;
   const Points from = points - start * normals;
   const Points to = points - 2.0 * (depths.asDiagonal() * normals);

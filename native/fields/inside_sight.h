@@ -35,6 +35,7 @@ class ARAPFIELDS_EXPORT_TO_TESTS InsideSight {
  private:
   SignedDistance distance_;
   std::vector<std::int32_t> piece_of_triangle_;
+  bool is_one_piece_ = true;
   double size_ = 1.0;  // of the mesh in the cube
 };
 

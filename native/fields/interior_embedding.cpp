@@ -37,7 +37,7 @@ constexpr double facing_widths = 2.0, facing_cosine = -0.3, facing_behind = 1e-3
 /// node, and a weight of e^{−16} is nothing.
 constexpr double sight_widths = 5.0;
 /// Longest interior distance that is looked for, in widths: nodes beyond it have no weight.
-constexpr double longest_widths = 9.0;
+constexpr double longest_widths = 7.0;
 /// Depth of eyes below the surface, in widths.
 constexpr double eye_widths = 0.15;
 /// Nodes that are tried, in the order of distance, before a point takes the nearest one with a like normal.
@@ -253,47 +253,71 @@ struct SeenNodes {
 SeenNodes nearest_seen(PointsIn points, PointsIn normals, PointsIn nodes, PointsIn node_normals, double width,
                        const InsideSight& mesh) {
   const Index count = points.rows(), tried = std::min(most_tried, nodes.rows());
-  std::vector<Index> candidates(static_cast<std::size_t>(count * tried));
-  parallel_for(0, count, 64, [&](Index first, Index last) {
-    std::vector<Index> order(static_cast<std::size_t>(nodes.rows()));
-    Vector squares(nodes.rows());
-    for (Index i = first; i < last; ++i) {
-      for (Index j = 0; j < nodes.rows(); ++j) squares[j] = (nodes.row(j) - points.row(i)).squaredNorm();
-      std::iota(order.begin(), order.end(), Index{0});
-      std::partial_sort(order.begin(), order.begin() + tried, order.end(), [&](Index a, Index c) {
-        return squares[a] != squares[c] ? squares[a] < squares[c] : a < c;
-      });
-      std::copy_n(order.begin(), tried, candidates.begin() + i * tried);
-    }
-  });
+  const Eigen::ArrayX3d columns = nodes;
+  const auto squares_from = [&](Index i, Eigen::ArrayXd& squares) {
+    squares.head(nodes.rows()) = (columns.col(0) - points(i, 0)).square() +
+                                 (columns.col(1) - points(i, 1)).square() +
+                                 (columns.col(2) - points(i, 2)).square();
+  };
   const InsideSight::Eyes from = eyes_of(points, normals, width, mesh),
                           to = eyes_of(nodes, node_normals, width, mesh);
   SeenNodes result{std::vector<Index>(static_cast<std::size_t>(count)),
                    Vector::Constant(count, std::numeric_limits<double>::infinity())};
-  std::vector<Index> left(static_cast<std::size_t>(count));
-  std::iota(left.begin(), left.end(), Index{0});
-  for (Index round = 0; round < tried && !left.empty(); ++round) {
-    std::vector<std::pair<Index, Index>> pairs;
-    for (const Index i : left) pairs.emplace_back(i, candidates[i * tried + round]);
+  std::vector<Index> left;
+  // Takes the nodes that their points see; the points of the others are left.
+  const auto look = [&](const std::vector<std::pair<Index, Index>>& pairs) {
     const std::vector<bool> seen = mesh.see(from, to, pairs);
-    std::vector<Index> next;
+    left.clear();
     for (std::size_t k = 0; k < pairs.size(); ++k) {
       const auto [i, node] = pairs[k];
       if (!seen[k]) {
-        next.push_back(i);
+        left.push_back(i);
         continue;
       }
       result.nodes[i] = node;
       result.distances[i] = (nodes.row(node) - points.row(i)).norm();
     }
-    left = std::move(next);
+  };
+  std::vector<std::pair<Index, Index>> pairs(static_cast<std::size_t>(count));
+  parallel_for(0, count, 64, [&](Index first, Index last) {
+    Eigen::ArrayXd squares(nodes.rows());
+    for (Index i = first; i < last; ++i) {
+      Index nearest = 0;
+      squares_from(i, squares);
+      squares.minCoeff(&nearest);
+      pairs[i] = {i, nearest};
+    }
+  });
+  look(pairs);
+  // Few points do not see their nearest node: these try more, in the order of distance.
+  const std::vector<Index> others = left;
+  std::vector<Index> candidates(others.size() * static_cast<std::size_t>(tried));
+  parallel_for(0, std::ssize(others), 16, [&](Index first, Index last) {
+    Eigen::ArrayXd squares(nodes.rows());
+    std::vector<Index> order(static_cast<std::size_t>(nodes.rows()));
+    for (Index k = first; k < last; ++k) {
+      squares_from(others[k], squares);
+      std::iota(order.begin(), order.end(), Index{0});
+      std::partial_sort(order.begin(), order.begin() + tried, order.end(), [&](Index a, Index c) {
+        return squares[a] != squares[c] ? squares[a] < squares[c] : a < c;
+      });
+      std::copy_n(order.begin(), tried, candidates.begin() + k * tried);
+    }
+  });
+  const auto row_of = [&](Index i) {
+    return std::lower_bound(others.begin(), others.end(), i) - others.begin();
+  };
+  for (Index round = 1; round < tried && !left.empty(); ++round) {
+    pairs.clear();
+    for (const Index i : left) pairs.emplace_back(i, candidates[row_of(i) * tried + round]);
+    look(pairs);
   }
   for (const Index i : left) {
-    result.nodes[i] = candidates[i * tried];
-    for (Index k = tried - 1; k >= 0; --k)
-      if (const Index node = candidates[i * tried + k];
-          node_normals.row(node).dot(normals.row(i)) > like_cosine)
-        result.nodes[i] = node;
+    const Index* const own = &candidates[row_of(i) * tried];
+    const Index* const like = std::find_if(own, own + tried, [&](Index node) {
+      return node_normals.row(node).dot(normals.row(i)) > like_cosine;
+    });
+    result.nodes[i] = like != own + tried ? *like : *own;
   }
   return result;
 }
