@@ -69,7 +69,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
                 before, topology = surface.extract(tracker, 0.1, **extraction)
                 after = field(before)
             else:
-                after = placed.moved(field(surface.vertices), field)
+                after = placed.moved(field(surface.vertices, triangles=surface.faces), field)
         if not np.isfinite(after).all():
             raise UserError("The result has vertices that are not finite; try other settings")
         moves, place = np.eye(4), None

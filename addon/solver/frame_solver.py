@@ -76,6 +76,11 @@ class FrameSolver:
         is_of_source = self.sampled.topology is None
         return self.sampled.setup.surface.vertices if is_of_source else self.sampled.rest
 
+    @property
+    def rest_triangles(self):
+        """(m, 3) triangles whose vertices `rest` are, by which parts that touch are told apart; None: unknown."""
+                return self.sampled.setup.surface.faces if self.sampled.topology is None else None
+
     def _make_solver(self, handles, energy):
         """Makes the native solver for these handles and energy weights; its field starts at rest."""
         af, options, setup = native.library(), {**energy}, self.sampled.setup
@@ -101,7 +106,7 @@ class FrameSolver:
     def _track(self):
         """Tracks the points to measure their motion; of splats only some, as the field itself moves them."""
         every = max(1, len(self.rest) // TRACKED) if self.moves_splats else 1
-        self.solver.track(self.rest[::every])
+        self.solver.track(self.rest[::every], triangles=self.rest_triangles)
 
     def _native_handles(self, handles):
         setup, af = self.sampled.setup, native.library()
@@ -167,7 +172,7 @@ class FrameSolver:
 
     def exact_shape(self, request):
         """The request's shape, evaluated from the field."""
-        return self._shape(request, self.solver.field(self.rest))
+        return self._shape(request, self.solver.field(self.rest, triangles=self.rest_triangles))
 
     def _shape(self, request, solved):
         surface, topology = self.sampled.setup.surface, self.sampled.topology

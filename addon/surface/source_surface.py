@@ -57,6 +57,11 @@ class SourceSurface:
         """The chosen implicit surface; on the worker."""
         return self._exact_surface if self.exact else self.fit.surface(tracker, weight)
 
+        @property
+    def faces(self):
+        """The triangles whose vertices a field moves, by which it tells touching parts apart; None without any."""
+        return self.triangles if self.splats is None and len(self.triangles) else None
+
     def samples(self, tracker, count, seed, own_triangles):
         """Uniform samples of the implicit surface, or with `own_triangles` of the mesh."""
         af = native.library()

@@ -25,9 +25,20 @@ JetBlock<double> evaluate(const DeformationField& field, const ArrayArgument& po
   return block;
 }
 
-Points values(const DeformationField& field, const ArrayArgument& points) {
-  const Points mesh = as_finite_points(points, "points");
-  return run_long([&] { return field.at(mesh); });
+std::optional<Triangles> as_triangles_of(const std::optional<ArrayArgument>& triangles) {
+  return triangles ? std::optional<Triangles>(as_triangles(*triangles, "triangles")) : std::nullopt;
+}
+
+Points values(const DeformationField& field, const ArrayArgument& points,
+              const std::optional<ArrayArgument>& triangles) {
+  TriangleMesh mesh{as_finite_points(points, "points"), {}};
+  const std::optional<Triangles> faces = as_triangles_of(triangles);
+  if (faces) mesh.triangles = *faces;
+  return run_long([&] {
+    if (!faces) return field.at(mesh.vertices);
+    validate(mesh);
+    return field.at_vertices(mesh);
+  });
 }
 
 FieldArray jacobian(const DeformationField& field, const ArrayArgument& points) {
@@ -84,18 +95,27 @@ void bind_fields(py::module_& module) {
   py::class_<DeformationField, std::shared_ptr<DeformationField>>(
       module, "DeformationField", py::dynamic_attr(),
       "A smooth deformation of space, x ↦ f(x), with its derivatives; all in mesh coordinates.")
-      .def("__call__", &values, "points"_a, "Deformed positions (p, 3) of points (p, 3).")
+      .def("__call__", &values, "points"_a, py::kw_only(), "triangles"_a = py::none(), R"(
+Deformed positions (p, 3) of points (p, 3).
+
+With `triangles` (m, 3) the points are a mesh's vertices: where its parts touch at rest, as closed lips do, each
+vertex moves with the part that it belongs to. Else a point takes the side of the surface that is nearest.)")
       .def(
           "apply",
-          [](const DeformationField& field, const ArrayArgument& points, double strength) {
+          [](const DeformationField& field, const ArrayArgument& points, double strength,
+             const std::optional<ArrayArgument>& triangles) {
             const Points mesh = as_points(points, "points");
-            return run_long([&] { return apply_field(field, mesh, strength); });
+            const std::optional<Triangles> faces = as_triangles_of(triangles);
+            return run_long([&] { return apply_field(field, mesh, strength, faces ? &*faces : nullptr); });
           },
-          "points"_a, py::kw_only(), "strength"_a = 1.0,
+          "points"_a, py::kw_only(), "strength"_a = 1.0, "triangles"_a = py::none(),
           R"(
 The field at another mesh of the same shape, of any resolution or topology: (p, 3).
 
-`strength` scales the displacement. InvalidInput where more than a tenth of the points lie outside the body's
+`strength` scales the displacement. With `triangles` (m, 3) the points are a mesh's vertices: where its parts
+touch at rest, as closed lips or neighbouring fingers do, each vertex moves with the part that it belongs to.
+Without them, and in calls of the field itself, a point takes the side of the nearest point of the surface that
+the field was solved on. InvalidInput where more than a tenth of the points lie outside the body's
 box and farther from its surface than 0.1 of its size.)")
       .def("jacobian", &jacobian, "points"_a, "(p, 3, 3): [:, i, j] = ∂f_i/∂x_j.")
       .def("hessian", &hessian, "points"_a, "(p, 3, 3, 3): [:, i, j, k] = ∂²f_i/∂x_j∂x_k (1/length).")

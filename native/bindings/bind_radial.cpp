@@ -230,11 +230,19 @@ As solve(), for callers that need tracked() alone: it makes no field, and measur
 Returns the number of iterations, fewer than `iterations` where the solve has converged.)")
       .def(
           "track",
-          [](Live& live, const ArrayArgument& points) {
+          [](Live& live, const ArrayArgument& points, const std::optional<ArrayArgument>& triangles) {
             const Points mesh = as_points(points, "points");
-            run_alone(live, nullptr, [&](RadialSolver& solver, const Progress&) { solver.track(mesh); });
+            const auto faces = triangles
+                                   ? std::make_shared<const Triangles>(as_triangles(*triangles, "triangles"))
+                                   : nullptr;
+            run_alone(live, nullptr,
+                      [&](RadialSolver& solver, const Progress&) { solver.track(mesh, faces); });
           },
-          "points"_a, "Prepares rest points (n, 3), such as a mesh's vertices, for tracked().")
+          "points"_a, py::kw_only(), "triangles"_a = py::none(), R"(
+Prepares rest points (n, 3), such as a mesh's vertices, for tracked().
+
+With `triangles` (m, 3) the points are a mesh's vertices: where its parts touch at rest, as closed lips do, each
+vertex moves with the part that it belongs to.)")
       .def(
           "tracked",
           [](Live& live) {

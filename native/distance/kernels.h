@@ -24,6 +24,12 @@ ARAPFIELDS_DECLARE(void nearest_of_all(const HierarchyView& tree, const double* 
 /// area / (4π R²) · (radius / R)⁴, the scale of the truncation error.
 ARAPFIELDS_DECLARE(void winding(const HierarchyView& tree, const double* points, std::int64_t count,
                                 double opening, double* numbers, double* remainders))
+/// For each segment the least t ∈ [0,1] at which from + t (to − from) meets a triangle; infinity if it meets
+/// none. Edges and corners belong to their triangles; triangles without area, and those in a segment's own
+/// plane, are not met. With `labels` (one for each triangle) a segment meets those of its own label alone.
+ARAPFIELDS_DECLARE(void first_crossings(const HierarchyView& tree, const double* from, const double* to,
+                                        std::int64_t count, const std::int32_t* labels,
+                                        const std::int32_t* own_labels, double* results))
 /// Bit j of links[i]: the empty balls about points i and j overlap. count ≤ linked_points.
 ARAPFIELDS_DECLARE(void overlapping(const double* points, const Nearest* nearest, int count,
                                     std::uint64_t* links))

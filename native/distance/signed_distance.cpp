@@ -239,6 +239,28 @@ void SignedDistance::winding_number(PointsIn points, Eigen::Ref<Vector> numbers,
   });
 }
 
+Vector SignedDistance::first_crossings(PointsIn from, PointsIn to, const std::vector<std::int32_t>& labels,
+                                       const std::vector<std::int32_t>& own_labels,
+                                       const Progress& progress) const {
+  const Hierarchy& hierarchy = parts_->hierarchy;
+  require_usable(from, hierarchy);
+  require_usable(to, hierarchy);
+  Vector result(from.rows());
+  const HierarchyView view = hierarchy.view();
+  parallel_for(0, from.rows(), block_size, [&](Index begin, Index end) {
+    progress.check();
+    Points starts(end - begin, 3), ends(end - begin, 3);
+    for (Index i = begin; i < end; ++i) {
+      starts.row(i - begin) = hierarchy.normalized(from.row(i).transpose()).transpose();
+      ends.row(i - begin) = hierarchy.normalized(to.row(i).transpose()).transpose();
+    }
+    ARAPFIELDS_DISPATCH(first_crossings(
+        view, starts.data(), ends.data(), end - begin, own_labels.empty() ? nullptr : labels.data(),
+        own_labels.empty() ? nullptr : own_labels.data() + begin, result.data() + begin));
+  });
+  return result;
+}
+
 Vector signed_distance(PointsIn vertices, TrianglesIn triangles, PointsIn points, int threads,
                        const Progress& progress) {
   const ThreadScope scope(threads);

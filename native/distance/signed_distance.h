@@ -40,6 +40,12 @@ class ARAPFIELDS_EXPORT SignedDistance {
   /// How often the soup winds around each point: 1 inside and 0 outside of a closed surface, fractions near
   /// the gaps of an open one. Off by less than 1e-3 for a single sheet.
   void winding_number(PointsIn points, Eigen::Ref<Vector> numbers, const Progress& progress = {}) const;
+  /// For each segment from a point of `from` (p,3) to that of `to` (p,3) the least t ∈ [0,1] at which from +
+  /// t (to − from) meets the soup; infinity where it meets nothing. `labels`, if given, has one number for
+  /// each triangle, and a segment then meets the triangles of its own label (p) alone.
+  Vector first_crossings(PointsIn from, PointsIn to, const std::vector<std::int32_t>& labels = {},
+                         const std::vector<std::int32_t>& own_labels = {},
+                         const Progress& progress = {}) const;
   /// Whether the triangles' oriented edges cancel (vertices at equal positions taken as one): then the
   /// winding number is an integer, constant wherever one can go without touching a triangle.
   bool is_closed() const;

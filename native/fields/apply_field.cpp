@@ -15,7 +15,9 @@ constexpr double near_share = 0.1, most_outside = 0.1;
 
 }  // namespace
 
-Points apply_field(const DeformationField& field, PointsIn points, double strength) {
+Points apply_field(const DeformationField& field, PointsIn points, double strength,
+                   const Triangles* triangles) {
+  if (triangles != nullptr) validate(points, *triangles);
   require(points.allFinite(), "points", "some coordinates are NaN or infinite", "all must be finite");
   require_range("strength", strength, -10.0, 10.0);
   const Points& rest = field.rest_points();
@@ -39,7 +41,7 @@ Points apply_field(const DeformationField& field, PointsIn points, double streng
                          "a mesh of the same shape, in the same place and size, is needed; what goes along "
                          "with the body is carried by an Attachment");
   }
-  const Points moved = field.at(points);
+  const Points moved = triangles != nullptr ? field.at_vertices({points, *triangles}) : field.at(points);
   if (strength == 1.0) return moved;
   return points + strength * (moved - points);
 }

@@ -6,6 +6,7 @@
 #include "core/frame.h"
 #include "core/jets.h"
 #include "core/types.h"
+#include "mesh/triangle_mesh.h"
 #include "optimize/matrix_place.h"
 
 namespace arapfields {
@@ -29,6 +30,10 @@ class ARAPFIELDS_EXPORT DeformationField {
     evaluate(frame_.to_cube(mesh_points), {values.data(), values.rows(), JetOrder::value});
     return frame_.to_mesh(values);
   }
+
+  /// Deformed vertices (n,3) of a valid mesh, all in mesh coordinates. Where parts of the mesh touch at rest,
+  /// a field on the surface takes each vertex on the side that its triangles show.
+  virtual Points at_vertices(const TriangleMesh& mesh) const { return at(mesh.vertices); }
 
   /// Whether f⁻¹ has a closed form, preimages().
   virtual bool has_preimages() const { return false; }

@@ -78,7 +78,7 @@ RowMatrix<double> InteriorGraph::distances(Index sources) const {
   return result;
 }
 
-std::vector<float> InteriorGraph::distances_from(std::vector<float> start) const {
+std::vector<float> InteriorGraph::distances_from(std::vector<float> start, float longest) const {
   using Entry = std::pair<float, std::int32_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue;
   for (Index i = 0; i < size(); ++i)
@@ -89,7 +89,7 @@ std::vector<float> InteriorGraph::distances_from(std::vector<float> start) const
     queue.pop();
     if (length > start[node]) continue;
     for (const Edge& edge : edges(node))
-      if (length + edge.length < start[edge.to]) {
+      if (length + edge.length < start[edge.to] && length + edge.length <= longest) {
         start[edge.to] = length + edge.length;
         queue.emplace(start[edge.to], edge.to);
       }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -31,8 +32,10 @@ class InteriorGraph {
   const std::vector<Edge>& edges(Index node) const { return edges_[node]; }
   /// Lengths (n, sources) of the shortest paths from the first `sources` nodes.
   RowMatrix<double> distances(Index sources) const;
-  /// Multi-source shortest paths: lengths (n), given the initial length (n) of each source; infinity: none.
-  std::vector<float> distances_from(std::vector<float> start) const;
+  /// Multi-source shortest paths: lengths (n), given the initial length (n) of each source; infinity: none,
+  /// or none of at most `longest`.
+  std::vector<float> distances_from(std::vector<float> start,
+                                    float longest = std::numeric_limits<float>::infinity()) const;
 
  private:
   void join_parts(PointsIn nodes);

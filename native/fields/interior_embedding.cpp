@@ -4,12 +4,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
 #include <vector>
 
 #include "core/decompositions.h"
 #include "core/parallel.h"
 #include "fields/interior_embedding_kernel.h"
 #include "fields/radial_basis.h"
+#include "sampling/nearest_sample.h"
 
 namespace arapfields {
 namespace {
@@ -25,6 +29,20 @@ constexpr double smoothing = 10.0, neighbour_spacings = 3.0;
 constexpr double worthwhile_spread = 0.04;
 /// Logarithm of the weight, relative to the nearest node's, below which nodes are skipped.
 constexpr double negligible = -36.0;
+
+/// Where parts of the shape nearly touch: a sample this near, in widths, whose normal is opposite (its cosine
+/// is below), in front of the node or hardly behind it (as a share of the width).
+constexpr double facing_widths = 2.0, facing_cosine = -0.3, facing_behind = 1e-3;
+/// Distance, in widths, up to which it matters what a node sees: a point is within one width of its own
+/// node, and a weight of e^{−16} is nothing.
+constexpr double sight_widths = 5.0;
+/// Longest interior distance that is looked for, in widths: nodes beyond it have no weight.
+constexpr double longest_widths = 7.0;
+/// Depth of eyes below the surface, in widths.
+constexpr double eye_widths = 0.15;
+/// Nodes that are tried, in the order of distance, before a point takes the nearest one with a like normal.
+constexpr Index most_tried = 12;
+constexpr double like_cosine = 0.3;
 
 using Neighbours = std::vector<std::vector<Index>>;
 
@@ -135,20 +153,44 @@ void symmetrise(InteriorEmbedding& embedding, const std::vector<Index>& twins, i
   }
 }
 
+InsideSight::Eyes eyes_of(PointsIn points, PointsIn normals, double width, const InsideSight& mesh) {
+  return mesh.below(points, normals, Vector::Constant(points.rows(), eye_widths * width));
+}
+
 }  // namespace
 
-void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out) const {
+void NodeSight::set_places(PointsIn places, std::vector<SurfaceSide> sides) {
+  places_ = places;
+  sides_ = std::move(sides);
+  nearest_ = places_.rows() > 0 ? std::make_shared<const SignedDistance>(nearest_samples(places_)) : nullptr;
+}
+
+std::vector<SurfaceSide> NodeSight::sides_near(PointsIn points) const {
+  std::vector<SurfaceSide> result(static_cast<std::size_t>(points.rows()), -1);
+  if (!nearest_ || points.rows() == 0) return result;
+  const ClosestPoints closest = nearest_->closest(points);
+  for (std::size_t i = 0; i < result.size(); ++i)
+    if (closest.distances[static_cast<Index>(i)] < reach)
+      result[i] = sides_[static_cast<std::size_t>(closest.triangles[i])];
+  return result;
+}
+
+void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
+                                 const std::vector<SurfaceSide>* sides) const {
   constexpr Index block = embedding_block;
   const Index count = points.rows(), n = nodes.rows();
   RowMatrix<double> rows(n, embedding_row);
   rows << nodes, values, slopes;
   const double scale = 1.0 / (width * width);
   const int columns_count = columns(out.order);
+  std::vector<SurfaceSide> found;
+  if (sight && sides == nullptr) found = sight->sides_near(points), sides = &found;
   parallel_for(0, (count + block - 1) / block, 4, [&](Index first, Index last) {
     std::array<double, 3 * block> packed;
     std::array<double, 30 * block> jets;
     std::vector<std::int32_t> near(n);
-    std::vector<double> distance(n);
+    std::vector<double> distance(n), excess;
+    std::vector<Index> slots(sight ? n : 0, -1);  // of the nodes among those that are near
     for (Index b = first; b < last; ++b) {
       const Index valid = std::min(block, count - b * block);
       const auto part = points.middleRows(b * block, valid);
@@ -162,13 +204,36 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out) const {
         distance[j] = std::sqrt(a * a + c * c + d * d);
         nearest = std::min(nearest, distance[j]);
       }
-      const double farthest_nearest = nearest + radius;
+      double farthest_nearest = nearest + radius;
+      bool hides = false;  // whether a point of the block does not see some node
+      const auto side_of = [&](Index i) {
+        return sight ? (*sides)[static_cast<std::size_t>(b * block + std::min(i, valid - 1))]
+                     : SurfaceSide{-1};
+      };
+      for (Index i = 0; sight && i < valid; ++i)
+        if (const SurfaceSide side = side_of(i); side >= 0) {
+          hides = hides || sight->starts[side] < sight->starts[side + 1];
+          farthest_nearest = std::max(farthest_nearest, (part.row(i) - nodes.row(side)).norm());
+        }
       const double cutoff =
           std::sqrt(farthest_nearest * farthest_nearest - negligible * width * width) + radius;
       Index near_count = 0;
       for (Index j = 0; j < n; ++j)
         if (distance[j] <= cutoff) near[near_count++] = static_cast<std::int32_t>(j);
-      const EmbeddingBlock embedding_block_data{packed.data(), rows.data(), near.data(), near_count, scale};
+      if (hides) {
+        excess.assign(static_cast<std::size_t>(near_count * block), 0.0);
+        for (Index a = 0; a < near_count; ++a) slots[near[a]] = a;
+        for (Index i = 0; i < block; ++i) {
+          const SurfaceSide side = side_of(i);
+          if (side < 0) continue;
+          for (std::int32_t k = sight->starts[side]; k < sight->starts[side + 1]; ++k)
+            if (const Index slot = slots[sight->others[k]]; slot >= 0)
+              excess[slot * block + i] = sight->excess[k];
+        }
+        for (Index a = 0; a < near_count; ++a) slots[near[a]] = -1;
+      }
+      const EmbeddingBlock embedding_block_data{packed.data(), rows.data(), near.data(),
+                                                near_count,    scale,       hides ? excess.data() : nullptr};
       ARAPFIELDS_DISPATCH(embedding_jets(embedding_block_data, columns_count, jets.data()));
       for (int c = 0; c < columns_count; ++c)
         for (Index p = 0; p < valid; ++p)
@@ -177,8 +242,223 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out) const {
   });
 }
 
-std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals, int axis,
-                                                            const MayJoin& may_join) {
+namespace {
+
+/// For each point (n,3) of a surface, with its normal, the nearest of the nodes that it sees.
+struct SeenNodes {
+  std::vector<Index> nodes;  ///< where a point sees none of those tried: the nearest one with a like normal
+  Vector distances;          ///< infinity there
+};
+
+SeenNodes nearest_seen(PointsIn points, PointsIn normals, PointsIn nodes, PointsIn node_normals, double width,
+                       const InsideSight& mesh) {
+  const Index count = points.rows(), tried = std::min(most_tried, nodes.rows());
+  const Eigen::ArrayX3d columns = nodes;
+  const auto squares_from = [&](Index i, Eigen::ArrayXd& squares) {
+    squares.head(nodes.rows()) = (columns.col(0) - points(i, 0)).square() +
+                                 (columns.col(1) - points(i, 1)).square() +
+                                 (columns.col(2) - points(i, 2)).square();
+  };
+  const InsideSight::Eyes from = eyes_of(points, normals, width, mesh),
+                          to = eyes_of(nodes, node_normals, width, mesh);
+  SeenNodes result{std::vector<Index>(static_cast<std::size_t>(count)),
+                   Vector::Constant(count, std::numeric_limits<double>::infinity())};
+  std::vector<Index> left;
+  // Takes the nodes that their points see; the points of the others are left.
+  const auto look = [&](const std::vector<std::pair<Index, Index>>& pairs) {
+    const std::vector<bool> seen = mesh.see(from, to, pairs);
+    left.clear();
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const auto [i, node] = pairs[k];
+      if (!seen[k]) {
+        left.push_back(i);
+        continue;
+      }
+      result.nodes[i] = node;
+      result.distances[i] = (nodes.row(node) - points.row(i)).norm();
+    }
+  };
+  std::vector<std::pair<Index, Index>> pairs(static_cast<std::size_t>(count));
+  parallel_for(0, count, 64, [&](Index first, Index last) {
+    Eigen::ArrayXd squares(nodes.rows());
+    for (Index i = first; i < last; ++i) {
+      Index nearest = 0;
+      squares_from(i, squares);
+      squares.minCoeff(&nearest);
+      pairs[i] = {i, nearest};
+    }
+  });
+  look(pairs);
+  // Few points do not see their nearest node: these try more, in the order of distance.
+  const std::vector<Index> others = left;
+  std::vector<Index> candidates(others.size() * static_cast<std::size_t>(tried));
+  parallel_for(0, std::ssize(others), 16, [&](Index first, Index last) {
+    Eigen::ArrayXd squares(nodes.rows());
+    std::vector<Index> order(static_cast<std::size_t>(nodes.rows()));
+    for (Index k = first; k < last; ++k) {
+      squares_from(others[k], squares);
+      std::iota(order.begin(), order.end(), Index{0});
+      std::partial_sort(order.begin(), order.begin() + tried, order.end(), [&](Index a, Index c) {
+        return squares[a] != squares[c] ? squares[a] < squares[c] : a < c;
+      });
+      std::copy_n(order.begin(), tried, candidates.begin() + k * tried);
+    }
+  });
+  const auto row_of = [&](Index i) {
+    return std::lower_bound(others.begin(), others.end(), i) - others.begin();
+  };
+  for (Index round = 1; round < tried && !left.empty(); ++round) {
+    pairs.clear();
+    for (const Index i : left) pairs.emplace_back(i, candidates[row_of(i) * tried + round]);
+    look(pairs);
+  }
+  for (const Index i : left) {
+    const Index* const own = &candidates[row_of(i) * tried];
+    const Index* const like = std::find_if(own, own + tried, [&](Index node) {
+      return node_normals.row(node).dot(normals.row(i)) > like_cosine;
+    });
+    result.nodes[i] = like != own + tried ? *like : *own;
+  }
+  return result;
+}
+
+/// Rows of the samples that are farther than a width from all nodes that they see, among those near marked
+/// nodes, chosen so that each of them sees a node within the width: two walls that face each other need nodes
+/// of their own.
+std::vector<Index> unseen_samples(PointsIn samples, PointsIn normals, const std::vector<Index>& chosen,
+                                  const std::vector<bool>& marked, double width, const InsideSight& mesh) {
+  std::vector<Index> near;
+  for (Index i = 0; i < samples.rows(); ++i)
+    for (std::size_t k = 0; k < chosen.size(); ++k)
+      if (marked[k] && (samples.row(chosen[k]) - samples.row(i)).squaredNorm() < 4.0 * width * width) {
+        near.push_back(i);
+        break;
+      }
+  const Points places = samples(near, Eigen::all), directions = normals(near, Eigen::all);
+  Vector distances =
+      nearest_seen(places, directions, samples(chosen, Eigen::all), normals(chosen, Eigen::all), width, mesh)
+          .distances;
+  const InsideSight::Eyes eyes = eyes_of(places, directions, width, mesh);
+  std::vector<Index> added;
+  for (Index farthest = 0; !near.empty() && std::ssize(added) < most_nodes / 2;) {
+    if (!(distances.maxCoeff(&farthest) > width)) break;
+    added.push_back(near[farthest]);
+    distances[farthest] = 0.0;
+    std::vector<std::pair<Index, Index>> pairs;
+    for (Index i = 0; i < places.rows(); ++i)
+      if (distances[i] > width && (places.row(i) - places.row(farthest)).squaredNorm() < width * width)
+        pairs.emplace_back(farthest, i);
+    const std::vector<bool> seen = mesh.see(eyes, eyes, pairs);
+    for (std::size_t k = 0; k < pairs.size(); ++k)
+      if (const Index i = pairs[k].second; seen[k])
+        distances[i] = (places.row(i) - places.row(farthest)).norm();
+  }
+  return added;
+}
+
+}  // namespace
+
+std::vector<SurfaceSide> InteriorEmbedding::sides_of(PointsIn points, PointsIn normals,
+                                                     const InsideSight& mesh) const {
+  std::vector<SurfaceSide> result(static_cast<std::size_t>(points.rows()), -1);
+  if (!sight) return result;
+  std::vector<Index> hiding;  // nodes that do not see all others
+  for (Index i = 0; i < nodes.rows(); ++i)
+    if (sight->starts[i] < sight->starts[i + 1]) hiding.push_back(i);
+  const double near = sight->reach * sight->reach;
+  std::vector<char> matters(result.size());
+  parallel_for(0, points.rows(), 256, [&](Index first, Index last) {
+    for (Index p = first; p < last; ++p)
+      for (std::size_t k = 0; k < hiding.size() && matters[p] == 0; ++k)
+        matters[p] = (nodes.row(hiding[k]) - points.row(p)).squaredNorm() < near;
+  });
+  std::vector<Index> some;
+  for (Index p = 0; p < points.rows(); ++p)
+    if (matters[p] != 0) some.push_back(p);
+  if (some.empty()) return result;
+  const SeenNodes seen =
+      nearest_seen(points(some, Eigen::all), normals(some, Eigen::all), nodes, sight->normals, width, mesh);
+  for (std::size_t k = 0; k < some.size(); ++k) result[some[k]] = static_cast<SurfaceSide>(seen.nodes[k]);
+  return result;
+}
+
+std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& mesh, const Frame& frame) const {
+  if (!sight) return std::vector<SurfaceSide>(static_cast<std::size_t>(mesh.vertices.rows()), -1);
+  return sides_of(frame.to_cube(mesh.vertices), vertex_normals(mesh), InsideSight(mesh, frame));
+}
+
+namespace {
+
+/// Marks the nodes near which parts of the shape nearly touch.
+std::vector<bool> near_other_parts(const Points& nodes, const Points& normals, PointsIn samples,
+                                   PointsIn sample_normals, double width) {
+  const double near = facing_widths * width;
+  std::vector<char> faces(static_cast<std::size_t>(nodes.rows()));
+  parallel_for(0, nodes.rows(), 32, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i)
+      for (Index j = 0; j < samples.rows() && faces[i] == 0; ++j) {
+        const Eigen::RowVector3d way = samples.row(j) - nodes.row(i);
+        faces[i] = way.squaredNorm() < near * near && way.dot(normals.row(i)) > -facing_behind * width &&
+                   normals.row(i).dot(sample_normals.row(j)) < facing_cosine;
+      }
+  });
+  std::vector<bool> result(faces.size());
+  const double reach = sight_widths * width;
+  for (Index i = 0; i < nodes.rows(); ++i)
+    for (Index j = 0; j < nodes.rows() && !result[i]; ++j)
+      result[i] = faces[j] != 0 && (nodes.row(i) - nodes.row(j)).squaredNorm() < reach * reach;
+  return result;
+}
+
+/// Pairs of nodes, near each other, that do not see each other: a list for each node.
+Neighbours hidden_pairs(const Points& nodes, const Points& normals, double width, const InsideSight& mesh) {
+  const double reach = sight_widths * width;
+  std::vector<std::pair<Index, Index>> pairs;
+  for (Index i = 0; i < nodes.rows(); ++i)
+    for (Index j = i + 1; j < nodes.rows(); ++j)
+      if ((nodes.row(i) - nodes.row(j)).squaredNorm() < reach * reach) pairs.emplace_back(i, j);
+  const InsideSight::Eyes eyes = eyes_of(nodes, normals, width, mesh);
+  const std::vector<bool> seen = mesh.see(eyes, eyes, pairs);
+  Neighbours hidden(static_cast<std::size_t>(nodes.rows()));
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+    if (!seen[k])
+      hidden[pairs[k].first].push_back(pairs[k].second), hidden[pairs[k].second].push_back(pairs[k].first);
+  for (auto& list : hidden) std::sort(list.begin(), list.end());
+  return hidden;
+}
+
+/// Takes into the sight the interior distances of the pairs that do not see each other.
+void measure(const InteriorGraph& graph, const Points& nodes, const Neighbours& hidden, double width,
+             NodeSight& sight) {
+  const auto longest = static_cast<float>(longest_widths * width);
+  std::vector<std::vector<double>> excess(hidden.size());
+  parallel_for(0, nodes.rows(), 8, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) {
+      if (hidden[i].empty()) continue;
+      std::vector<float> start(hidden.size(), std::numeric_limits<float>::infinity());
+      start[i] = 0.0f;
+      const std::vector<float> lengths = graph.distances_from(std::move(start), longest);
+      for (const Index j : hidden[i]) {
+        const double inside = detour * std::min(lengths[j], longest);
+        excess[i].push_back(std::max(0.0, inside * inside - (nodes.row(i) - nodes.row(j)).squaredNorm()));
+      }
+    }
+  });
+  sight.starts.assign(1, 0);
+  for (std::size_t i = 0; i < hidden.size(); ++i) {
+    for (std::size_t k = 0; k < hidden[i].size(); ++k)
+      if (excess[i][k] > 0.0) {
+        sight.others.push_back(static_cast<std::int32_t>(hidden[i][k]));
+        sight.excess.push_back(excess[i][k]);
+      }
+    sight.starts.push_back(static_cast<std::int32_t>(sight.others.size()));
+  }
+}
+
+}  // namespace
+
+std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals, int axis,
+                                                      const MayJoin& may_join, const MakeSight& make_sight) {
   if (samples.rows() < least_nodes || normals.rows() != samples.rows()) return nullptr;
   const Index most = axis < 0 ? most_nodes : most_nodes / 2;
   const FarthestPoints chosen = farthest_points(samples, std::min<Index>(most, samples.rows()));
@@ -186,18 +466,52 @@ std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, Po
     return nullptr;
   InteriorEmbedding embedding;
   embedding.width = chosen.fill_distance;
-  embedding.nodes = samples(chosen.indices, Eigen::all);
-  Points node_normals = normals(chosen.indices, Eigen::all);
+  // Where parts of the shape nearly touch, no edge of the graph crosses the surface.
+  std::vector<Index> rows = chosen.indices;
+  std::shared_ptr<const InsideSight> mesh;
+  if (make_sight) {
+    Points others = samples, other_normals = normals;
+    if (axis >= 0) {
+      others.conservativeResize(2 * samples.rows(), 3);
+      other_normals.conservativeResize(2 * samples.rows(), 3);
+      others.bottomRows(samples.rows()) = samples;
+      other_normals.bottomRows(samples.rows()) = normals;
+      others.col(axis).tail(samples.rows()) *= -1.0;
+      other_normals.col(axis).tail(samples.rows()) *= -1.0;
+    }
+    const std::vector<bool> marked = near_other_parts(samples(rows, Eigen::all), normals(rows, Eigen::all),
+                                                      others, other_normals, embedding.width);
+    if (std::find(marked.begin(), marked.end(), true) != marked.end()) mesh = make_sight();
+    if (mesh) {
+      const std::vector<Index> added = unseen_samples(samples, normals, rows, marked, embedding.width, *mesh);
+      rows.insert(rows.end(), added.begin(), added.end());
+    }
+  }
+  embedding.nodes = samples(rows, Eigen::all);
+  Points node_normals = normals(rows, Eigen::all);
   std::vector<Index> twins;
   if (axis >= 0) twins = add_reflections(embedding.nodes, node_normals, axis, embedding.width);
   const Index n = embedding.nodes.rows();
   // Landmarks are the first nodes, in complete mirrored pairs.
   const Index count = landmarks + (axis >= 0 && twins[landmarks - 1] == landmarks ? 1 : 0);
-  const MayJoin rows_may_join = [&](Index i, Index j) {
-    return may_join(chosen.indices[i], chosen.indices[j]);
+  const MayJoin rows_may_join = [&](Index i, Index j) { return may_join(rows[i], rows[j]); };
+  Neighbours hidden;
+  if (mesh) {
+    embedding.sight = std::make_shared<NodeSight>();
+    embedding.sight->reach = sight_widths * embedding.width;
+    embedding.sight->normals = node_normals;
+    hidden = hidden_pairs(embedding.nodes, node_normals, embedding.width, *mesh);
+  }
+  const MayJoin nodes_may_join = [&](Index i, Index j) {
+    return (!may_join || rows_may_join(i, j)) &&
+           (hidden.empty() || !std::binary_search(hidden[i].begin(), hidden[i].end(), j));
   };
   const InteriorGraph graph(embedding.nodes, node_normals, embedding.width,
-                            may_join ? rows_may_join : MayJoin());
+                            may_join || mesh ? nodes_may_join : MayJoin());
+  if (embedding.sight) {
+    measure(graph, embedding.nodes, hidden, embedding.width, *embedding.sight);
+    if (embedding.sight->others.empty()) embedding.sight = nullptr;
+  }
   RowMatrix<double> excess = (detour * graph.distances(count)).array().square();
   for (Index i = 0; i < n; ++i)
     for (Index l = 0; l < count; ++l)
@@ -215,10 +529,10 @@ std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples, Po
   const Eigen::RowVector3d middle = embedding.values.colwise().mean();
   const double spread =
       (embedding.values.rowwise() - middle).colwise().squaredNorm().maxCoeff() / static_cast<double>(n);
-  if (spread < worthwhile_spread * worthwhile_spread * size * size) return nullptr;
+  if (spread < worthwhile_spread * worthwhile_spread * size * size && !embedding.sight) return nullptr;
   embedding.slopes = fitted_slopes(embedding.nodes, embedding.values, neighbours);
   if (axis >= 0) symmetrise(embedding, twins, axis);
-  return std::make_shared<const InteriorEmbedding>(std::move(embedding));
+  return std::make_shared<InteriorEmbedding>(std::move(embedding));
 }
 
 }  // namespace arapfields

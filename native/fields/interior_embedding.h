@@ -1,36 +1,79 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <memory>
+#include <vector>
 
 #include "core/jets.h"
 #include "core/types.h"
+#include "distance/signed_distance.h"
+#include "fields/inside_sight.h"
 #include "fields/interior_distance.h"
 
 namespace arapfields {
 
-/// An embedding ψ: R³ → R³ that separates parts which are near in space but far apart inside the shape:
+/// The side of the surface that a point lies on, where parts of the shape nearly touch: the nearest node that
+/// it sees through the inside (row of the nodes); −1 where no part is near another.
+using SurfaceSide = std::int32_t;
+
+/// What the nodes of an embedding see of each other, where parts of the shape nearly touch through the
+/// outside, such as two lips or two fingers: nodes there that are near in space may be far inside the shape.
+struct ARAPFIELDS_EXPORT NodeSight {
+  /// Of node i: nodes that it does not see, others[k] for k from starts[i] to starts[i + 1], each with the
+  /// square by which its interior distance exceeds the straight one.
+  std::vector<std::int32_t> starts, others;
+  std::vector<double> excess;
+  double reach = 0.0;             ///< distance up to which nodes are listed
+  Points normals = Points(0, 3);  ///< (n,3) of the nodes, unit length
+
+  /// Points of the surface whose side is known, for queries that know nothing but their position.
+  void set_places(PointsIn places, std::vector<SurfaceSide> sides);
+  const Points& places() const { return places_; }
+  const std::vector<SurfaceSide>& sides() const { return sides_; }
+  /// The sides (n) of points (n,3): those of the nearest places.
+  std::vector<SurfaceSide> sides_near(PointsIn points) const;
+
+ private:
+  Points places_ = Points(0, 3);
+  std::vector<SurfaceSide> sides_;
+  std::shared_ptr<const SignedDistance> nearest_;
+};
+
+/// An embedding ψ that separates parts which are near in space but far apart inside the shape:
 /// |x − y|² + |ψ(x) − ψ(y)|² approximates the squared interior distance from x to y. ψ is given by values and
 /// gradients at nodes of the surface and blended between them with normalised Gaussian weights, as wide as
-/// the nodes' spacing (Franke and Little's modification of Shepard's method).
+/// the nodes' spacing (Franke and Little's modification of Shepard's method). In the weights, a node that a
+/// point's side does not see counts by its interior distance: ψ is a function on the surface, not in space,
+/// and parts that touch at rest have values of their own.
 struct ARAPFIELDS_EXPORT InteriorEmbedding {
-  Points nodes;              ///< (n,3)
-  Points values;             ///< (n,3) ψ at the nodes
-  RowMatrix<double> slopes;  ///< (n,9) ∂ψ_k/∂x_i at 3 k + i
-  double width = 0.0;        ///< of the Gaussians e^{−|x|²/width²}
+  Points nodes;                                ///< (n,3)
+  Points values;                               ///< (n,3) ψ at the nodes
+  RowMatrix<double> slopes;                    ///< (n,9) ∂ψ_k/∂x_i at 3 k + i
+  double width = 0.0;                          ///< of the Gaussians e^{−|x|²/width²}
+  std::shared_ptr<NodeSight> sight = nullptr;  ///< null: all nodes that are near see each other
 
-  /// Jets of ψ at points (n,3), of any order.
-  void evaluate(PointsIn points, JetView<double> out) const;
+  /// Jets of ψ at points (n,3), of any order, each on its side (n); null: on that of the nearest known place.
+  void evaluate(PointsIn points, JetView<double> out, const std::vector<SurfaceSide>* sides = nullptr) const;
+  /// The sides (n) of points (n,3) of a surface with outward unit normals (n,3).
+  std::vector<SurfaceSide> sides_of(PointsIn points, PointsIn normals, const InsideSight& mesh) const;
+  /// The same of a mesh's vertices, in mesh coordinates; `frame` is that of the nodes' cube.
+  std::vector<SurfaceSide> sides_of(const TriangleMesh& mesh, const Frame& frame) const;
 };
+
+/// Makes the sight of the surface when it is needed; null where the surface is not known.
+using MakeSight = std::function<std::shared_ptr<const InsideSight>()>;
 
 /// ψ of a surface from samples (n,3) and their outward normals, by landmark multidimensional scaling (de
 /// Silva, Tenenbaum 2004) of the squared interior distances minus the squared Euclidean ones. Null if these
 /// hardly differ, and for less than a hundred distinct samples. With an axis (0, 1, 2), samples are those
 /// where that coordinate is positive, whose reflections are added, and ψ is symmetric: interior distances
 /// from x to y and from S x to S y are equal. `may_join`: whether an edge of the graph may join two samples;
-/// none: always; without an axis only.
-ARAPFIELDS_EXPORT std::shared_ptr<const InteriorEmbedding> interior_embedding(PointsIn samples,
-                                                                              PointsIn normals, int axis = -1,
-                                                                              const MayJoin& may_join = {});
+/// none: always; without an axis only. `make_sight`: called where parts nearly touch.
+ARAPFIELDS_EXPORT std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals,
+                                                                        int axis = -1,
+                                                                        const MayJoin& may_join = {},
+                                                                        const MakeSight& make_sight = {});
 
 }  // namespace arapfields

@@ -53,14 +53,16 @@ void jets_of(const EmbeddingBlock& block, double* jets) {
     for (std::int64_t a = 0; a < block.near_count; ++a) {
       const double* node = block.nodes + embedding_row * block.near[a];
       const P d0 = x[0] - node[0], d1 = x[1] - node[1], d2 = x[2] - node[2];
-      const P square = d0 * d0 + d1 * d1 + d2 * d2;
+      P square = d0 * d0 + d1 * d1 + d2 * d2;
+      if (block.excess != nullptr) square += load(block.excess + embedding_block * a + offset);
       nearest = square < nearest ? square : nearest;
     }
     Sums<columns> sums;
     for (std::int64_t a = 0; a < block.near_count; ++a) {
       const double* node = block.nodes + embedding_row * block.near[a];
       const P d[3] = {x[0] - node[0], x[1] - node[1], x[2] - node[2]};
-      const P square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+      P square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+      if (block.excess != nullptr) square += load(block.excess + embedding_block * a + offset);
       add_node<columns>(node, d, exponential<double>((nearest - square) * block.scale), 2.0 * block.scale,
                         sums);
     }

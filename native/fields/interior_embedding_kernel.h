@@ -17,7 +17,8 @@ struct EmbeddingBlock {
   const double* nodes;
   const std::int32_t* near;
   std::int64_t near_count;
-  double scale;  // 1/width²
+  double scale;          // 1/width²
+  const double* excess;  // (near_count, 16) added to the squared distances; null: nothing
 };
 
 // Jets (columns, 3, 16) of ψ.

@@ -36,7 +36,7 @@ double ball_of(ConstPointsRef<double> rows, double* center) {
 
 template <class Scalar>
 RadialEvaluator<Scalar>::RadialEvaluator(const RadialBasis& basis, PointsIn points, JetOrder most,
-                                         const Points* known)
+                                         const Points* known, const std::vector<SurfaceSide>* sides)
     : center_count_(basis.center_count()), count_(points.rows()), most_(most) {
   const std::vector<double> exact = center_rows(basis);
   centers_.assign(exact.begin(), exact.end());
@@ -48,7 +48,7 @@ RadialEvaluator<Scalar>::RadialEvaluator(const RadialBasis& basis, PointsIn poin
               std::to_string(known->rows()) + " rows", "one for each point is needed, and values alone");
       Eigen::Map<Points>(jets.view().data, count_, 3) = *known;
     } else {
-      basis.embedding->evaluate(points, jets.view());
+      basis.embedding->evaluate(points, jets.view(), sides);
     }
     pack_embedding(jets);
   }

@@ -19,9 +19,9 @@ class RadialEvaluator {
 
   RadialEvaluator() = default;
   /// `most`: the highest order that will be evaluated. `embedded`: the basis' embedding of the points, if it
-  /// is known and `most` is the value.
+  /// is known and `most` is the value. `sides`: those of the points, as in InteriorEmbedding::evaluate().
   RadialEvaluator(const RadialBasis& basis, PointsIn points, JetOrder most = JetOrder::second,
-                  const Points* embedded = nullptr);
+                  const Points* embedded = nullptr, const std::vector<SurfaceSide>* sides = nullptr);
   Index size() const { return count_; }
 
   /// Jets of the field with these coefficients (size, 3), written to `out` (count = size(), any order), for

@@ -33,16 +33,23 @@ RadialField::RadialField(RadialBasis basis, RowMatrix<double> coefficients,
           "finite numbers are needed");
 }
 
-void RadialField::evaluate(PointsIn points, JetView<double> out) const {
+void RadialField::evaluate(PointsIn points, JetView<double> out) const { evaluate(points, out, nullptr); }
+
+void RadialField::evaluate(PointsIn points, JetView<double> out,
+                           const std::vector<SurfaceSide>* sides) const {
   if (points.rows() <= worth_sorting) {
-    RadialEvaluator<double>(basis_, points, out.order).evaluate(coefficients_, out);
+    RadialEvaluator<double>(basis_, points, out.order, nullptr, sides).evaluate(coefficients_, out);
     if (influence_) influence_->confine(points, out);
     return;
   }
   const std::vector<std::uint32_t> order = morton_order(points);
   JetBlock<double> sorted(points.rows(), out.order);
   const Points near = points(order, Eigen::all);
-  RadialEvaluator<double>(basis_, near, out.order).evaluate(coefficients_, sorted.view());
+  std::vector<SurfaceSide> near_sides;
+  for (const std::uint32_t i : order)
+    if (sides != nullptr) near_sides.push_back((*sides)[i]);
+  RadialEvaluator<double>(basis_, near, out.order, nullptr, sides != nullptr ? &near_sides : nullptr)
+      .evaluate(coefficients_, sorted.view());
   parallel_for(0, points.rows(), 1024, [&](Index first, Index last) {
     for (int c = 0; c < columns(out.order); ++c)
       for (Index i = first; i < last; ++i) std::copy_n(sorted.view().at(c, i), 3, out.at(c, order[i]));
@@ -50,8 +57,18 @@ void RadialField::evaluate(PointsIn points, JetView<double> out) const {
   if (influence_) influence_->confine(points, out);
 }
 
-Points RadialField::at(PointsIn mesh_points) const {
-  Points result = DeformationField::at(mesh_points);
+Points RadialField::at(PointsIn mesh_points) const { return moved(mesh_points, nullptr); }
+
+Points RadialField::at_vertices(const TriangleMesh& mesh) const {
+  if (!basis_.embedding || !basis_.embedding->sight) return at(mesh.vertices);
+  const std::vector<SurfaceSide> sides = basis_.embedding->sides_of(mesh, frame());
+  return moved(mesh.vertices, &sides);
+}
+
+Points RadialField::moved(PointsIn mesh_points, const std::vector<SurfaceSide>* sides) const {
+  Points result(mesh_points.rows(), 3);
+  evaluate(frame().to_cube(mesh_points), {result.data(), result.rows(), JetOrder::value}, sides);
+  result = frame().to_mesh(result);
   if (!influence_) return result;
   const Vector influence = influence_->at(frame().to_cube(mesh_points));
   for (Index i = 0; i < result.rows(); ++i)  // conversion to the cube and back rounds

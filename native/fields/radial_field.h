@@ -16,6 +16,7 @@ class ARAPFIELDS_EXPORT RadialField : public DeformationField {
               std::shared_ptr<const Influence> influence = nullptr);
   void evaluate(PointsIn points, JetView<double> out) const override;
   Points at(PointsIn mesh_points) const override;
+  Points at_vertices(const TriangleMesh& mesh) const override;
 
   const RadialBasis& basis() const { return basis_; }
   const RowMatrix<double>& coefficients() const { return coefficients_; }
@@ -25,6 +26,9 @@ class ARAPFIELDS_EXPORT RadialField : public DeformationField {
   bool shares_places_with(const RadialField& other) const;
 
  private:
+  void evaluate(PointsIn points, JetView<double> out, const std::vector<SurfaceSide>* sides) const;
+  Points moved(PointsIn mesh_points, const std::vector<SurfaceSide>* sides) const;
+
   RadialBasis basis_;
   RowMatrix<double> coefficients_;
   std::shared_ptr<const Influence> influence_;

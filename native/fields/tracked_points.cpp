@@ -1,19 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fields/tracked_points.h"
 
+#include <utility>
+
 #include "core/errors.h"
 #include "distance/morton.h"
 
 namespace arapfields {
 
-TrackedPoints::TrackedPoints(const RadialBasis& basis, const Frame& frame, PointsIn mesh_points)
-    : frame_(frame), rest_(mesh_points) {
+TrackedPoints::TrackedPoints(const RadialBasis& basis, const Frame& frame, PointsIn mesh_points,
+                             std::shared_ptr<const Triangles> triangles)
+    : frame_(frame), rest_(mesh_points), triangles_(std::move(triangles)) {
   require(mesh_points.allFinite(), "points", "some are NaN or infinite", "all must be finite");
+  if (triangles_) validate(mesh_points, *triangles_);
   if (mesh_points.rows() == 0) return;
   order_ = morton_order(mesh_points);
   Points sorted(mesh_points.rows(), 3);
   for (Index i = 0; i < sorted.rows(); ++i) sorted.row(i) = mesh_points.row(order_[i]);
-  evaluator_ = RadialEvaluator<float>(basis, frame.to_cube(sorted), JetOrder::value);
+  std::vector<SurfaceSide> sides;
+  if (triangles_ && basis.embedding && basis.embedding->sight) {
+    const std::vector<SurfaceSide> given = basis.embedding->sides_of({mesh_points, *triangles_}, frame);
+    for (const std::uint32_t i : order_) sides.push_back(given[i]);
+  }
+  evaluator_ = RadialEvaluator<float>(basis, frame.to_cube(sorted), JetOrder::value, nullptr,
+                                      sides.empty() ? nullptr : &sides);
 }
 
 void TrackedPoints::set_influence(const std::shared_ptr<const Influence>& influence) {

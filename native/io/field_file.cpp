@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
 #include <deque>
 
 #include "core/errors.h"
@@ -81,6 +83,21 @@ class FieldArrays {
     add_rows(prefix + "embedding.nodes", basis.embedding->nodes);
     add_rows(prefix + "embedding.values", basis.embedding->values);
     add_rows(prefix + "embedding.slopes", basis.embedding->slopes);
+
+    if (basis.embedding->sight) add_sight(*basis.embedding->sight, prefix + "embedding.sight.");
+  }
+  void add_sight(const NodeSight& sight, const std::string& prefix) {
+    const auto add_list = [&](const char* name, const auto& list) {
+      Vector& kept = doubles_.emplace_back(std::ssize(list));
+      std::copy(list.begin(), list.end(), kept.begin());
+      file.add(prefix + name, {kept.size()}, kept.data());
+    };
+    add_rows(prefix + "normals", sight.normals);
+    add_list("starts", sight.starts);
+    add_list("others", sight.others);
+    add_list("excess", sight.excess);
+    add_rows(prefix + "places", sight.places());
+    add_list("sides", sight.sides());
   }
 
   void add_composed(const ComposedField& field, const std::string& prefix) {
@@ -95,8 +112,13 @@ class FieldArrays {
 void add_radial_structure(const RadialField& field, Json& structure) {
   structure["centers"] = field.basis().center_count();
   if (field.influence()) structure["influence"] = field.influence()->places().rows();
-  if (const InteriorEmbedding* embedding = field.basis().embedding.get())
+  if (const InteriorEmbedding* embedding = field.basis().embedding.get()) {
     structure["embedding"] = {{"nodes", embedding->nodes.rows()}, {"width", embedding->width}};
+    if (embedding->sight)
+      structure["embedding"]["sight"] = {{"pairs", std::ssize(embedding->sight->others)},
+                                         {"places", embedding->sight->places().rows()},
+                                         {"reach", embedding->sight->reach}};
+  }
 }
 
 Json structure_of(const DeformationField& field) {
@@ -170,6 +192,39 @@ std::shared_ptr<DeformationField> read_invertible(ArchiveReader& file, const Jso
   return field;
 }
 
+/// Whole numbers from 0 on below `end`.
+std::vector<std::int32_t> read_rows(ArchiveReader& file, const std::string& name, Index count, Index end) {
+  std::vector<std::int32_t> result;
+  for (const double value : file.doubles(name, {count})) {
+    require(value >= 0.0 && value < static_cast<double>(end) && value == std::floor(value), name,
+            number_text(value), "whole numbers from 0 to " + std::to_string(end - 1) + " are needed");
+    result.push_back(static_cast<std::int32_t>(value));
+  }
+  return result;
+}
+
+std::shared_ptr<NodeSight> read_sight(ArchiveReader& file, const JsonObject& object,
+                                      const std::string& prefix, Index nodes) {
+  const Index pairs = object.integer("pairs", 0, INT32_MAX - 1),
+              places = object.integer("places", 0, most_rows);
+  auto sight = std::make_shared<NodeSight>();
+  sight->reach = object.number("reach");
+  require_positive(object.name("reach"), sight->reach);
+  sight->normals = file.points(prefix + "normals", nodes);
+  sight->starts = read_rows(file, prefix + "starts", nodes + 1, pairs + 1);
+  require(std::is_sorted(sight->starts.begin(), sight->starts.end()) && sight->starts.front() == 0 &&
+              sight->starts.back() == pairs,
+          prefix + "starts", "not in order", "they rise from 0 to the number of pairs");
+  sight->others = read_rows(file, prefix + "others", pairs, nodes);
+  const Vector excess = file.doubles(prefix + "excess", {pairs});
+  require(pairs == 0 || excess.minCoeff() >= 0.0, prefix + "excess", "negative numbers",
+          "none may be negative");
+  sight->excess.assign(excess.begin(), excess.end());
+  const Points known = file.points(prefix + "places", places);
+  sight->set_places(known, read_rows(file, prefix + "sides", places, nodes));
+  return sight;
+}
+
 std::shared_ptr<RadialField> read_radial(ArchiveReader& file, const JsonObject& object,
                                          const std::string& prefix) {
   const Index count = object.integer("centers", 0, most_rows);
@@ -177,14 +232,19 @@ std::shared_ptr<RadialField> read_radial(ArchiveReader& file, const JsonObject& 
   basis.centers = file.points(prefix + "centers", count);
   basis.radii = file.doubles(prefix + "radii", {count});
   if (object.has("embedding")) {
-    const JsonObject embedding(object.at("embedding"), object.name("embedding"), {"nodes", "width"});
+    const JsonObject embedding(object.at("embedding"), object.name("embedding"), {"nodes", "width", "sight"});
     const Index nodes = embedding.integer("nodes", 1, most_rows);
     InteriorEmbedding restored;
-    restored.width = embedding.number("width");
+
     restored.nodes = file.points(prefix + "embedding.nodes", nodes);
     restored.values = file.points(prefix + "embedding.values", nodes);
     const Vector slopes = file.doubles(prefix + "embedding.slopes", {nodes, 9});
     restored.slopes = Eigen::Map<const RowMatrix<double>>(slopes.data(), nodes, 9);
+    restored.width = embedding.number("width");
+    if (embedding.has("sight"))
+      restored.sight = read_sight(
+          file, JsonObject(embedding.at("sight"), embedding.name("sight"), {"pairs", "places", "reach"}),
+          prefix + "embedding.sight.", nodes);
     basis.set_embedding(std::make_shared<const InteriorEmbedding>(std::move(restored)));
   }
   std::shared_ptr<const Influence> influence;

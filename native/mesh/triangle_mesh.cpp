@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "mesh/triangle_mesh.h"
 
+#include <Eigen/Geometry>
 #include <string>
 #include <vector>
 
 #include "core/errors.h"
+#include "core/unit_rows.h"
 
 namespace arapfields {
 
@@ -41,6 +43,16 @@ Points used_vertices(PointsIn vertices, TrianglesIn triangles) {
     if (used[i]) result.row(count++) = vertices.row(i);
   result.conservativeResize(count, 3);
   return result;
+}
+
+Points vertex_normals(const TriangleMesh& mesh) {
+  Points normals = Points::Zero(mesh.vertices.rows(), 3);
+  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return Vec3(mesh.vertices.row(mesh.triangles(t, k))); };
+    const Vec3 area = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+    for (int k = 0; k < 3; ++k) normals.row(mesh.triangles(t, k)) += area;
+  }
+  return unit_rows(normals);
 }
 
 }  // namespace arapfields

@@ -20,6 +20,10 @@ inline void validate(const TriangleMesh& mesh) { validate(mesh.vertices, mesh.tr
 /// The vertices that some triangle refers to, in the order of `vertices`. The mesh must be valid.
 ARAPFIELDS_EXPORT Points used_vertices(PointsIn vertices, TrianglesIn triangles);
 
+/// Unit normals (n,3) of the vertices, means of their triangles' weighted by area; zero without a triangle.
+/// Vertices in one place have normals of their own.
+Points vertex_normals(const TriangleMesh& mesh);
+
 /// Of the bounding box of points (n,3).
 inline double diagonal_of(PointsIn points) {
   return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();

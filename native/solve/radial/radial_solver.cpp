@@ -142,7 +142,7 @@ void RadialSolver::set_symmetry(SymmetryPlane symmetry, const Progress& progress
   next.set_secondary_motion(s.dynamics.motion(), progress);
   next.set_contact(s.contact.contact(), s.in_one_go, progress);
   next.adopt(*field());
-  if (s.tracked.size() > 0) next.track(s.tracked.rest());
+  if (s.tracked.size() > 0) next.track(s.tracked.rest(), s.tracked.triangles());
   next.state_->report.setup_seconds += s.report.setup_seconds;
   *this = std::move(next);
 }
@@ -219,8 +219,9 @@ void RadialSolver::reset() {
   s.unmeasured = RadialState::Unmeasured::nothing;
 }
 
-void RadialSolver::track(PointsIn points) {
-  state_->tracked = TrackedPoints(state_->problem.basis, state_->problem.frame(), points);
+void RadialSolver::track(PointsIn points, std::shared_ptr<const Triangles> triangles) {
+  state_->tracked =
+      TrackedPoints(state_->problem.basis, state_->problem.frame(), points, std::move(triangles));
 }
 
 PointsF RadialSolver::tracked() const {

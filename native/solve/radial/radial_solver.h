@@ -84,7 +84,8 @@ class ARAPFIELDS_EXPORT RadialSolver {
   Index add_fold_samples(double barrier);
 
   /// Points (n,3) in mesh coordinates at which tracked() evaluates the field, with precomputed basis values.
-  void track(PointsIn points);
+  /// `triangles` are those of the mesh whose vertices the points are; null: not known.
+  void track(PointsIn points, std::shared_ptr<const Triangles> triangles = nullptr);
   PointsF tracked() const;
 
   std::shared_ptr<RadialField> field() const;

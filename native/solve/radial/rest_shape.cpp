@@ -50,7 +50,27 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
   if (!interior || normals.rows() == 0) return;
   progress.check();
   const MayJoin sites_may_join = [&](Index i, Index j) { return may_join(chosen[i], chosen[j]); };
-  embedding = interior_embedding(sites, normals, axis, may_join ? sites_may_join : MayJoin());
+  std::shared_ptr<const InsideSight> sight;
+  const MakeSight make_sight = [&] {
+    return sight = std::make_shared<const InsideSight>(*samples.mesh, samples.frame, progress);
+  };
+  const std::shared_ptr<InteriorEmbedding> made = interior_embedding(
+      sites, normals, axis, may_join ? sites_may_join : MayJoin(), samples.mesh ? make_sight : MakeSight());
+  if (made && made->sight) {
+    // Samples and vertices know their sides by the mesh; other points take that of the nearest of them.
+    const Index count = samples.size(), vertices = samples.mesh->vertices.rows();
+    Points places(count + vertices, 3), directions(count + vertices, 3);
+    places << samples.points, samples.frame.to_cube(samples.mesh->vertices);
+    directions << samples.normals, vertex_normals(*samples.mesh);
+    const std::vector<SurfaceSide> sides = made->sides_of(places, directions, *sight);
+    std::vector<Index> near;
+    std::vector<SurfaceSide> near_sides;
+    for (Index i = 0; i < places.rows(); ++i)
+      if (const SurfaceSide side = sides[static_cast<std::size_t>(i)]; side >= 0)
+        near.push_back(i), near_sides.push_back(side);
+    made->sight->set_places(rows_of(places, near), std::move(near_sides));
+  }
+  embedding = made;
 }
 
 std::shared_ptr<const FollowedPlaces> RestShape::followed(const SurfaceSamples& samples,

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parts of a shape that touch at rest, or nearly, come apart: the field is a function on the surface there."""
+
+import arapfields as af
+import numpy as np
+import pytest
+from support.geometry import slit
+from support.geometry.meshes import check_closed
+
+GAPS = [0.2, 0.02, 0.004, 0.0]
+# A jaw of size 1 turned by 25° about its hinge; a field of finite resolution rounds the slit's end.
+JAW_ERROR = 0.04
+
+
+def solved(gap, **options):
+    vertices, triangles, jaws = slit.slit_bar(gap)
+    samples = af.sample_mesh(vertices, triangles, count=8000)
+    field = af.deform(samples, slit.jaw_handles(), options=af.DeformOptions(**options))
+    return vertices, triangles, jaws, field
+
+
+def test_a_slit_bar_is_closed():
+    for gap in GAPS:
+        vertices, triangles, jaws = slit.slit_bar(gap)
+        check_closed(vertices, triangles)
+        corners = vertices[triangles]
+        volume = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
+        assert 1.7 < volume <= 2.0 + 1e-9
+
+
+@pytest.mark.parametrize("gap", GAPS)
+def test_the_jaws_of_a_slit_bar_come_apart(gap):
+    vertices, triangles, jaws, field = solved(gap)
+    deformed = field.apply(vertices, triangles=triangles)
+    assert max(slit.jaw_errors(vertices, jaws, deformed)) < JAW_ERROR
+    assert field.report.min_determinant > 0.0
+
+
+def test_a_closed_slit_costs_what_an_open_one_does():
+    energies = [solved(gap)[3].report.energy for gap in GAPS]
+    assert max(energies[1:]) < 4.0 * energies[0]
+
+
+def test_vertices_without_triangles_take_the_nearest_side():
+    vertices, triangles, _, field = solved(0.02)
+    assert np.allclose(field(vertices), field.apply(vertices, triangles=triangles), atol=1e-9)
+
+
+def test_a_saved_field_keeps_the_sides(tmp_path):
+    vertices, triangles, _, field = solved(0.004)
+    field.save(tmp_path / "field.safetensors")
+    loaded = af.DeformationField.load(tmp_path / "field.safetensors")
+    assert np.array_equal(loaded.apply(vertices, triangles=triangles), field.apply(vertices, triangles=triangles))
+    assert np.array_equal(loaded(vertices), field(vertices))
+
+
+def test_a_finer_mesh_is_moved_by_its_own_triangles():
+    field = solved(0.004)[3]
+    vertices, triangles, jaws = slit.slit_bar(0.004, columns=70, rows=24, layers=9)
+    deformed = field.apply(vertices, triangles=triangles)
+    assert max(slit.jaw_errors(vertices, jaws, deformed)) < JAW_ERROR
+
+
+def test_live_tracks_vertices_by_their_triangles():
+    vertices, triangles, jaws = slit.slit_bar(0.0)
+    samples = af.sample_mesh(vertices, triangles, count=8000)
+    live = af.LiveDeformer(samples, slit.jaw_handles())
+    live.track(vertices, triangles=triangles)
+    live.follow(iterations=100, tolerance=1e-6)
+    assert max(slit.jaw_errors(vertices, jaws, live.tracked())) < JAW_ERROR
+
+
+def test_triangles_of_other_vertices_are_refused():
+    vertices, triangles, _, field = solved(0.02)
+    with pytest.raises(af.InvalidInput, match="triangles"):
+        field.apply(vertices[:10], triangles=triangles)
