@@ -152,8 +152,9 @@ test-arm64: setup  ## the wheels' library for 64-bit ARM, and its native tests u
 	$(VENV)/bin/cmake --build $(ARM64) --target native_tests
 	qemu-aarch64-static -L /usr/aarch64-linux-gnu $(ARM64)/tests/native_tests --color_output=no --report_level=short
 
-fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind
+fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind, 10,000 steps of a walk through Blender
 	$(PY) -m tests.fuzz
+	$(PY) -m tests.fuzz.walk
 
 # PEERS=path names a folder with checkouts of implicit-arap and gaussStylization: these are then run, too.
 bench: build $(VENV)/.tools  ## paired benchmarks against the real competitors; PEERS=path: against others' public code

@@ -10,6 +10,7 @@ from . import commands, first_run, install_check, menus
 from .blender import icons, library_loading, modifier_stack, timers, translations
 from .blender.host import has_window
 from .blender.language import translated
+from .carried import carrying
 from .core.runtime import jobs, threads
 from .deform import first_result
 from .field_modifier import copies, motion
@@ -34,6 +35,7 @@ def before_load(*_):
     passing = (jobs.board, held_counts.pending, staleness.changed, row_selection.seen, prefetch)
     for state in (*passing, applying.solved, first_result.steps, left_behind.seen, stored.shapes):
         state.clear()
+    carrying.written.clear()
     sessions.stop_all()
     jobs.forget_messages()
 
@@ -134,7 +136,15 @@ PARTS = (  # what begins with the extension, and how it ends
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
 # Timers are started by blender/timers.py, threads by core/runtime/threads.py.
 STATE = (modal.runs, jobs.board, display, sessions.live, held_counts.pending, staleness.changed)
-STATE += (motion.written, hover, prefetch, applying.solved, previews.shown, first_result.steps)
+STATE += (
+    motion.written,
+    carrying.written,
+    hover,
+    prefetch,
+    applying.solved,
+    previews.shown,
+    first_result.steps,
+)
 STATE += (row_selection.seen, timers, style_object.cache, left_behind.seen, stored.shapes)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread

@@ -5,7 +5,7 @@ import bpy
 
 from .animation.properties import ARAPFIELDS_PG_bake
 from .blender.object_references import owner_of, settings_of
-from .blender.property_definitions import choice, collection, flag, integer, number, pointer, text
+from .blender.property_definitions import choice, collection, flag, integer, number, pointer, tells, text
 from .blender.selection import row_chosen
 from .carried.properties import ARAPFIELDS_PG_carried
 from .contact.properties import ARAPFIELDS_PG_contact
@@ -91,10 +91,10 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
         "Objects made from this one",
         override={*OVERRIDABLE, "USE_INSERTION"},
     )
-    output: output()
+    output: output(update=tells("place"))
     surface: surface()
     target: result()  # the name in files
-    result: result(get=get_result, set=set_result)
+    result: result(get=get_result, set=set_result, update=tells("place"))
     resolution: extraction().get("resolution")
     refine_thin: extraction().get("refine_thin")
     normals: choice(NORMALS, "Normals", "How meshes of the implicit surface are shaded")

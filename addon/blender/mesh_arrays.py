@@ -5,6 +5,7 @@ import hashlib
 from bisect import bisect_left
 from dataclasses import dataclass, replace
 
+import bmesh
 import bpy
 import numpy as np
 
@@ -186,4 +187,53 @@ def fill(mesh, vertices, topology):
     mesh.polygons.foreach_set("loop_start", np.arange(0, topology.corners.size, 3, dtype=np.int32))
     if topology.materials is not None:
         mesh.polygons.foreach_set("material_index", topology.materials)
+    mesh.update()
+
+
+def take_geometry(mesh, given):
+    """Replaces the mesh's vertices, edges and faces by those of another, without other attributes; a mesh of
+    the same topology keeps its own."""
+    topology = topology_of(given)
+    if not same_topology(mesh, given):
+        mesh.clear_geometry()
+        for part in ("vertices", "edges", "loops", "polygons"):
+            getattr(mesh, part).add(len(getattr(given, part)))
+        for name, numbers in topology.items():
+            if name == "loop_start":
+                mesh.polygons.foreach_set(name, numbers)
+            elif numbers.size:
+                mesh.attributes[name].data.foreach_set("value", numbers)
+    set_positions(mesh, positions(given))
+
+
+def topology_of(mesh):
+    """{name: flat int32 array}: vertices of edges and corners, edges of corners, first corners of faces."""
+    numbers = {}
+    for name, width in ((".edge_verts", 2), (".corner_vert", 1), (".corner_edge", 1)):
+        attribute = mesh.attributes.get(name)
+        numbers[name] = np.empty(width * len(attribute.data) if attribute is not None else 0, dtype=np.int32)
+        if numbers[name].size:
+            attribute.data.foreach_get("value", numbers[name])
+    numbers["loop_start"] = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", numbers["loop_start"])
+    return numbers
+
+
+def same_topology(mesh, other):
+    """Whether two meshes have the same edges and faces, by index."""
+    ours, theirs = topology_of(mesh), topology_of(other)
+    return len(mesh.vertices) == len(other.vertices) and all(
+        np.array_equal(ours[name], theirs[name]) for name in ours
+    )
+
+
+def take_all(mesh, given):
+    """Replaces what a mesh has by what another has, also its attributes and materials."""
+    copied = bmesh.new()
+    copied.from_mesh(given)
+    copied.to_mesh(mesh)
+    copied.free()
+    mesh.materials.clear()
+    for material in given.materials:
+        mesh.materials.append(material)
     mesh.update()

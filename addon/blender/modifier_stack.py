@@ -120,13 +120,15 @@ def is_replaced(modifier, rigs):
     return modifier.type == "ARMATURE" and modifier.object in rigs
 
 
+def rig_of(modifier):
+    """The armature of an Armature modifier, or None; a lost library leaves an Empty there."""
+    rig = modifier.object if modifier.type == "ARMATURE" else None
+    return rig if rig is not None and rig.type == "ARMATURE" else None
+
+
 def is_posing(source, modifier):
     """Whether this is an Armature modifier that poses the object, with no handles on its armature's bones."""
-    return (
-        modifier.type == "ARMATURE"
-        and modifier.object is not None
-        and not is_replaced(modifier, handle_rigs(source))
-    )
+    return rig_of(modifier) is not None and not is_replaced(modifier, handle_rigs(source))
 
 
 def left_behind(source):
@@ -222,7 +224,8 @@ def moved_mesh(context, source):
 
 @contextmanager
 def mesh_of(context, source, kept, frame=None):
-    """Context manager: the evaluated mesh or point cloud with the modifiers `kept` only."""
+    """Context manager: the evaluated mesh or point cloud with the modifiers `kept` only. Blender has one such
+    mesh of an object at a time: there is no second one within."""
     with evaluated(context, source, kept, frame) as (item, depsgraph):
         if source.type == "POINTCLOUD":
             yield item.data

@@ -3,6 +3,7 @@
 
 import bpy
 
+from . import undo_steps
 from .references import put_at, references
 
 
@@ -30,5 +31,9 @@ def remove_node_modifier(modifier):
     """Removes a Geometry Nodes modifier, and its node group if that is unused then."""
     group = modifier.node_group
     remove_modifier(modifier)
-    if group.users == 0:
+    remove_unused_group(group)
+
+
+def remove_unused_group(group):
+    if group.users == 0 and not undo_steps.keeps_unused:
         bpy.data.node_groups.remove(group)

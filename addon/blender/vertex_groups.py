@@ -16,7 +16,24 @@ BLOCK = 4000  # vertices read per step, which takes some milliseconds
 def missing(source, names):
     """UserError if a source lacks one of these groups; else None."""
     name = next((name for name in names if name not in source.vertex_groups), None)
-    return name and UserError("{name} has no vertex group {group}", source, group=name)
+    if name is None:
+        return None
+    return (
+        UserError("{name} has no vertex group {group}", source, group=name) if name else none_chosen(source)
+    )
+
+
+def none_chosen(source):
+    """The UserError where a vertex group is needed and none was chosen."""
+    if source.vertex_groups:
+        return UserError("{name}: choose a vertex group", source)
+    return UserError("{name} has no vertex group", source)
+
+
+def active_name(source):
+    """Name of the active vertex group, or ""; after Blender's Join there may be groups and none active."""
+    active = source.vertex_groups.active
+    return active.name if active is not None else ""
 
 
 def read_weights(context, source, names, in_place=False):

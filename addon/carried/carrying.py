@@ -19,6 +19,7 @@ from .rest_bones import above_field
 from .transforms import BonesCarrier
 from .world_matrices import world_matrices
 
+written = set()  # session_uids of the objects that were moved in this file
 SAME_PLACE = 1e-6  # tolerance as a share of an object's size, as matrices are in single precision
 
 
@@ -184,6 +185,7 @@ class Carrying:
             try:
                 item, entry = carried.item_and_entry(source)
                 if item.mode not in PAUSING:
+                    written.add(item.session_uid)
                     carried.carrier.write(item, entry, shape)
             except (UserError, RuntimeError) as error:
                 self.leave(carried, error)

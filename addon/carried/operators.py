@@ -44,7 +44,9 @@ class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
                 added += 1
             except UserError as error:
                 refused.append(translated(error))
-        if not added:
+        if added:
+            sessions.renew(context, source)
+        else:
             nothing = translated("Select the objects to carry as well")
             raise UserError("{error}", error="\n".join(refused) or nothing)
         error = bones.unposed(context, source)

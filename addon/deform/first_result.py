@@ -6,11 +6,12 @@ the file saved. Undo steps pushed during the solve contain the preview, so the m
 undo or redo to them.
 """
 
+import contextlib
 import hashlib
 
 import bpy
 
-from ..blender import modifier_stack, timers
+from ..blender import modifier_stack, timers, undo_steps
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..field_modifier import motion
@@ -60,7 +61,9 @@ class FirstResult:
         try:
             if not self._shown:
                 before = motion.snapshot(source)
-                motion.bind(bpy.context, source)
+                # Undo ends the preview: a modifier that it has added goes before; what others refer to stays.
+                with contextlib.nullcontext() if before is None else undo_steps.between():
+                    motion.bind(bpy.context, source)
                 self._shown, self._before = True, before
             local = self._surface.space.to_local(points.astype(float))
             motion.write(source, motion.Motion(local - self._surface.local))

@@ -6,6 +6,7 @@ import math
 import bpy
 import numpy as np
 
+from ..blender import undo_steps
 from ..blender.evaluation import depsgraph_of
 from ..blender.host import has_window
 from ..blender.language import about, translated
@@ -60,21 +61,21 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
         points = surface.samples(tracker, samples, seed, own_triangles=surface.exact and output == "WARP")
         field = solve(tracker, surface, points, weight)
         topology, report = None, {"output": output, **field.report.to_dict()}
+        needs_own = output == "WARP" or places
+        own = placed.moved(field(surface.vertices, triangles=surface.faces), field) if needs_own else None
         if output == "REMESH":
             after, topology, figures = surface.extract_moved(tracker, field, **extraction)
             report |= figures
+        elif output == "SURFACE":
+            extracted, topology = surface.extract(tracker, 0.1, **extraction)
+            after = field(extracted)
         else:
-            before = placed.now
-            if output == "SURFACE":
-                before, topology = surface.extract(tracker, 0.1, **extraction)
-                after = field(before)
-            else:
-                after = placed.moved(field(surface.vertices, triangles=surface.faces), field)
+            after = own
         if not np.isfinite(after).all():
             raise UserError("The result has vertices that are not finite; try other settings")
         moves, place = np.eye(4), None
         if places:
-            moves = similarity(before, after)
+            moves = similarity(placed.now, own)
             after = transform(inverse(moves), after)
             place = surface.space.solve_to_world @ moves @ surface.space.local_to_solve
         takes_turns = placement.keeps_mesh(output, result)
@@ -83,7 +84,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
         moved = carrying.moved(native.library(), points, field, carried, before=placed)
         local = surface.space.to_local(after)
         if output == "WARP":
-            local = surface.space.moved_to_local(after, before, placed.local)
+            local = surface.space.moved_to_local(after, placed.now, placed.local)
         pose = Pose(field, points, surface.space.local_to_solve)
         return SolvedMesh(local, topology, report, turns, changes, moved, place), pose
 
@@ -126,7 +127,7 @@ class SolveOperator(JobOperator):
 
     def push_undo(self):
         if self.ended_live:
-            bpy.ops.ed.undo_push(message="Live")
+            undo_steps.push("Live")
 
     def end_live(self, context, source, kind):
         """Ends live mode after all checks, and makes the result that the run acts on a layer."""

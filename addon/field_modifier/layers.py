@@ -8,7 +8,7 @@ When the field's modifier is removed, the last layer becomes the field's modifie
 import contextlib
 from itertools import count
 
-from ..blender import modifier_stack
+from ..blender import mesh_arrays, modifier_stack, undo_steps
 from ..blender.object_references import settings_of
 from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError
@@ -65,11 +65,14 @@ def make_way(source, kind):
     gone = []
     if stays_below(source, kind):
         cover(source)
-    while modifier_stack.layers(source) and ORDER[kind_in(modifier_stack.layers(source)[-1])] >= ORDER[kind]:
+    for layer in reversed(modifier_stack.layers(source)):
+        if ORDER[kind_in(layer)] < ORDER[kind]:
+            break
         field, by = modifier_stack.find(source), settings_of(source).moved_by
         gone.append(field and (motion.snapshot(source), by, inputs.get(field, "Factor")))
-        motion.discard(source)
-        uncover(source)
+        with undo_steps.unused_kept():  # put_back() may take them again, without a step of undo
+            motion.discard(source)
+            uncover(source, baked=True)
     return gone
 
 
@@ -80,7 +83,8 @@ def make_way_for_handle(source):
 
 
 def put_back(context, source, gone):
-    """Restores layers and the motion on top of them after a run that failed."""
+    """Restores layers and the motion on top of them after a run that failed, and a bake that played."""
+    playing = cache_modifier.suspend(source)
     for one in reversed(gone):
         if not can_stay(source):
             break
@@ -92,7 +96,9 @@ def put_back(context, source, gone):
                 motion.write(source, moved)
                 settings_of(source).moved_by = by
     if not gone:
-        uncover(source)
+        uncover(source, baked=True)
+    if playing:
+        cache_modifier.set_playing(source, True)
 
 
 def parts(layer):
@@ -120,10 +126,11 @@ def cover(source):
     settings.under_rig, settings.moved_by = False, ""
 
 
-def uncover(source):
-    """Turns the last layer into the field's modifier, unless there is one or a bake's modifier."""
+def uncover(source, baked=False):
+    """Turns the last layer into the field's modifier, unless there is one, or a bake's modifier and not
+    `baked`."""
     layers = modifier_stack.layers(source)
-    owned = modifier_stack.find(source) or modifier_stack.find_cache(source)
+    owned = modifier_stack.find(source) or (None if baked else modifier_stack.find_cache(source))
     if not layers or owned is not None or source.mode == "EDIT":
         return
     layer = layers[-1]
@@ -132,8 +139,9 @@ def uncover(source):
     motion.written.add(source.session_uid)
     moved = motion.read_from(mesh, number)
     if mesh == source.data and mesh.users > 1:
-        mesh = mesh.copy()  # other users keep their motion
-        motion.take_helper(source, layer, mesh)
+        helper = motion.take_helper(source, layer)  # other users keep their motion
+        mesh_arrays.take_geometry(helper.data, mesh)
+        mesh = helper.data
     motion.write_to(mesh, moved)
     motion.write_to(mesh, motion.Motion(None), number)
     motion.take_group(layer, node_group.find_or_make(normals))
@@ -151,6 +159,6 @@ def rename(modifier, old, new):
 
 def discard(source):
     """Removes the layers once the mesh contains their motion."""
-    while modifier_stack.layers(source) and modifier_stack.find(source) is None:
-        uncover(source)
+    for _ in modifier_stack.layers(source):
+        uncover(source, baked=True)
         motion.discard(source)

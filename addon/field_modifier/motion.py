@@ -2,7 +2,8 @@
 """An object's motion: its modifier, and the mesh that stores the offsets.
 
 Offsets are attributes of the mesh itself, or of a helper mesh in no scene if earlier modifiers make the
-vertices, or if the mesh is linked or shared with other objects.
+vertices, or if the mesh is linked or shared with other objects. While an object is live it has a helper in
+any case, empty if it is not needed: it may be needed between two steps of undo (blender/undo_steps.py).
 """
 
 from dataclasses import dataclass
@@ -10,12 +11,12 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack, splat_layouts
+from ..blender import mesh_arrays, modifier_stack, splat_layouts, undo_steps
 from ..blender.object_references import settings_of
 from ..blender.point_data import points_of
-from ..blender.removal import remove_mesh_object, remove_node_modifier
+from ..blender.removal import remove_mesh_object, remove_node_modifier, remove_unused_group
 from ..core.errors import UserError
-from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, TURNS
+from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS
 from . import armatures, cache_modifier, inputs, masks, node_group
 
 written = set()  # session_uids of objects that the add-on itself has moved since the last depsgraph update
@@ -37,13 +38,13 @@ def refusal(source):
     return None
 
 
-def bind(context, source, expected=None):
+def bind(context, source, expected=None, live=False):
     """Adds the modifier and the mesh that stores the offsets, without any; returns the modifier.
 
     An existing modifier keeps its place and inputs, and its motion if the number of points is the same.
-    UserError if that number is not `expected`.
+    UserError if that number is not `expected`. `live`: the helper is added in any case.
     """
-    modifier, copied = modifier_stack.find(source), None
+    modifier = modifier_stack.find(source)
     with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
         normals, count = modifier_stack.free_normals(mesh), len(points_of(mesh))
         splats = splat_layouts.columns_of(mesh)
@@ -54,20 +55,23 @@ def bind(context, source, expected=None):
     on_mesh = lies_on_mesh(source)
     if splats and not on_mesh:
         raise UserError("{name}: its splats need data and a first modifier of their own", source)
-    if not on_mesh:
-        copied = modifier_stack.mesh_copy(context, source, in_place=True)
     if modifier is None:
         modifier = add(source, normals, splats)
     else:
         choose_group(modifier, normals, splats)
     masks.take(source)
+    earlier, moved = carrier(source, modifier), snapshot(source)
+    if live or not on_mesh:
+        take_helper(source, modifier)
     if on_mesh:
-        forget_helper(modifier)
+        leave_helper(modifier, live)
     else:
-        take_helper(source, modifier, copied)
+        fill_helper(context, source, modifier)
     mesh = carrier(source, modifier)
     if len(points_of(mesh)) != count:
         raise UserError("{name} changed while it was worked on; run again", source)
+    if mesh != earlier and moved.offsets is not None and len(moved.offsets) == count:
+        write_to(mesh, moved)
     return modifier
 
 
@@ -78,6 +82,7 @@ def lies_on_mesh(source):
 
 def add(source, normals, splats):
     """A new field modifier at its place."""
+    undo_steps.refuse_new(source)
     index = modifier_stack.place(source)
     modifier = source.modifiers.new(FIELD_MODIFIER, "NODES")
     modifier.node_group = node_group.find_or_make(normals, splats)
@@ -87,7 +92,9 @@ def add(source, normals, splats):
 
 def choose_group(modifier, normals, splats):
     """Replaces the node group if the domain of the normals has changed."""
-    take_group(modifier, node_group.find_or_make(normals, splats))
+    if not node_group.is_for(modifier, normals, splats):
+        undo_steps.refuse_new(modifier.id_data)
+        take_group(modifier, node_group.find_or_make(normals, splats))
 
 
 def take_group(modifier, group):
@@ -97,39 +104,68 @@ def take_group(modifier, group):
     factor, mask = inputs.get(modifier, "Factor"), inputs.get(modifier, "Mask")
     masked, helper = inputs.get_attribute(modifier, "Mask"), inputs.get(modifier, "Offsets")
     old, modifier.node_group = modifier.node_group, group
-    if old.users == 0:
-        bpy.data.node_groups.remove(old)
+    remove_unused_group(old)
     for name, value in (("Factor", factor), ("Mask", mask), ("Offsets", helper)):
         inputs.put(modifier, name, value)
     inputs.put_attribute(modifier, "Mask", masked)
 
 
-def take_helper(source, modifier, mesh):
-    """Makes `mesh` the helper's, without its other attributes and materials; it keeps the motion of the mesh
-    before if that has as many points."""
-    own = [one.name for one in mesh.attributes if not (one.is_required or one.is_internal)]
-    for name in own:  # by name: removing an attribute invalidates the other references
-        if name not in (OFFSETS, TURNS):
-            mesh.attributes.remove(mesh.attributes[name])
-    mesh.materials.clear()
+def take_helper(source, modifier):
+    """Gives the modifier a helper of its own, unless it has one; between two steps of undo also one that it
+    shares with a duplicate will do. Returns it."""
     helper = inputs.get(modifier, "Offsets")
-    mesh.name = f"{source.name}{HELPER_SUFFIX}"
-    if helper is None or users_of(helper) > 1 or helper.library is not None:  # shared with a duplicate
-        inputs.put(modifier, "Offsets", bpy.data.objects.new(mesh.name, mesh))
-        return
-    old, count = helper.data, len(points_of(mesh))
-    motion = read_from(old)
-    helper.data = mesh
-    bpy.data.meshes.remove(old)
-    if motion.offsets is not None and len(motion.offsets) == count:
-        write_to(mesh, motion)
-
-
-def forget_helper(modifier):
-    helper = inputs.get(modifier, "Offsets")
+    if helper is not None and helper.library is None and (users_of(helper) == 1 or undo_steps.is_between):
+        return helper
+    own = unused_helper(source)
+    if own is None:
+        undo_steps.refuse_new(source)
+        mesh = bpy.data.meshes.new(f"{source.name}{HELPER_SUFFIX}")
+        own = bpy.data.objects.new(mesh.name, mesh)
     if helper is not None:
+        mesh_arrays.take_geometry(own.data, helper.data)
+        write_to(own.data, read_from(helper.data))
+    inputs.put(modifier, "Offsets", own)
+    return own
+
+
+def fill_helper(context, source, modifier):
+    """Gives the helper the vertices and faces at the modifier's place."""
+    shown = modifier_stack.mesh_copy(context, source, in_place=True)
+    try:
+        mesh_arrays.take_geometry(inputs.get(modifier, "Offsets").data, shown)
+    finally:
+        bpy.data.meshes.remove(shown)
+
+
+def leave_helper(modifier, live=False):
+    """Empties the helper, or one that is a duplicate's too is no longer the modifier's; `live`: it stays."""
+    helper = inputs.get(modifier, "Offsets")
+    if helper is None:
+        return
+    if users_of(helper) > 1 or helper.library is not None:
+        if len(helper.data.vertices):
+            inputs.put(modifier, "Offsets", None)
+    elif live or undo_steps.keeps_unused:
+        helper.data.clear_geometry()
+    else:
         inputs.put(modifier, "Offsets", None)
         discard_helper(helper)
+
+
+def drop_empty_helper(source):
+    """Called when live mode ends."""
+    modifier = modifier_stack.find(source)
+    if modifier is not None and carrier(source, modifier) == source.data:
+        leave_helper(modifier)
+
+
+def unused_helper(source):
+    """A helper that an earlier modifier of the source has left in the file, emptied; else None."""
+    helper = bpy.data.objects.get(f"{source.name}{HELPER_SUFFIX}")
+    if helper is None or helper.type != "MESH" or helper.library is not None or users_of(helper):
+        return None
+    helper.data.clear_geometry()
+    return helper
 
 
 def users_of(helper):
@@ -138,14 +174,14 @@ def users_of(helper):
 
 
 def discard_helper(helper):
-    if users_of(helper) == 0 and helper.library is None:
+    if users_of(helper) == 0 and helper.library is None and not undo_steps.keeps_unused:
         remove_mesh_object(helper)
 
 
 def carrier(source, modifier):
-    """The mesh that stores the offsets."""
+    """The mesh that stores the offsets: the helper's unless that is empty."""
     helper = inputs.get(modifier, "Offsets")
-    return source.data if helper is None else helper.data
+    return source.data if helper is None or not len(helper.data.vertices) else helper.data
 
 
 def write(source, motion):

@@ -24,10 +24,18 @@ def find_or_make(normals=PLAIN, splats=None):
     `splats`: {attribute: its type} of splats, whose changes it adds.
     """
     name = f"{FIELD_MODIFIER} {normals.title()} Normals" if normals else FIELD_MODIFIER
-    mark = f"{VERSION} {normals}"
-    if splats:
-        name, mark = f"{FIELD_MODIFIER} Splats", f"{VERSION} {' '.join(splats)}"
-    return kept_group(FIELD_GROUP, mark, lambda: build(name, normals, splats or {}))
+    name = f"{FIELD_MODIFIER} Splats" if splats else name
+    return kept_group(FIELD_GROUP, mark_of(normals, splats), lambda: build(name, normals, splats or {}))
+
+
+def mark_of(normals, splats):
+    return f"{VERSION} {' '.join(splats)}" if splats else f"{VERSION} {normals}"
+
+
+def is_for(modifier, normals, splats):
+    """Whether a field's modifier has the group that find_or_make() gives for these."""
+    group = modifier.node_group
+    return group.library is None and group[FIELD_GROUP] == mark_of(normals, splats)
 
 
 def find_or_make_layer(kind, number, normals=PLAIN):

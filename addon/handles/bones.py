@@ -17,7 +17,7 @@ HOLD_FROM = 0.8  # least weight of a bone's group that is held; between two bone
 def armature_of(context, source):
     """The selected armature, or the one that deforms the mesh; UserError without one."""
     selected = [item for item in context.selected_objects if item.type == "ARMATURE"]
-    moved_by = [m.object for m in source.modifiers if m.type == "ARMATURE" and in_scene(m.object)]
+    moved_by = [rig for rig in map(modifier_stack.rig_of, source.modifiers) if in_scene(rig)]
     parents = [source.parent] if source.parent is not None and source.parent.type == "ARMATURE" else []
     rig = next(iter([*selected, *moved_by, *parents]), None)
     if rig is None:
@@ -67,7 +67,7 @@ def unposed(context, source):
         item = entry.item
         if not in_scene(item) or item.type != "MESH" or entry.way == "RIGID":
             continue
-        own = rigs & {modifier.object for modifier in item.modifiers if modifier.type == "ARMATURE"}
+        own = rigs & set(map(modifier_stack.rig_of, item.modifiers))
         groups = holding_groups(context, item) if own else ()
         bones = [(rig, bone.name) for rig in own for bone in rig.data.bones if bone.use_deform]
         if any(bone[1] in groups and bone not in handles for bone in bones):

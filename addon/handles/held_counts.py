@@ -8,6 +8,7 @@ import bpy
 
 from ..blender import mesh_arrays, modifier_stack, timers, vertex_groups
 from ..blender.host import has_window
+from ..blender.language import translated
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.point_data import points_of
 from ..blender.redraw import redraw
@@ -36,6 +37,14 @@ def count_inside(context, source, at_once=False):
         entry.inside = -1
     pending[source.session_uid] = coroutine
     timers.start(poll_counts, first=INTERVAL)
+
+
+def count_for(operator, context, source, at_once=False):
+    """The same at the end of an operator, whose work is done by then: what hinders the count is a warning."""
+    try:
+        count_inside(context, source, at_once)
+    except (UserError, ValueError) as error:
+        operator.report({"WARNING"}, translated(error))
 
 
 def counting(context, source):

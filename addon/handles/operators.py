@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender import vertex_groups
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
 from ..blender.property_definitions import choice, flag, text
@@ -71,9 +72,9 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
     group: text("Vertex Group", "The group to hold, for that kind; empty for the object's active one")
 
     def change(self, context, source):
-        group = self.group or (source.vertex_groups.active.name if source.vertex_groups else "")
+        group = self.group or vertex_groups.active_name(source)
         if self.kind == "GROUP" and not group:
-            raise UserError("{name} has no vertex group", source)
+            raise vertex_groups.none_chosen(source)
         selected = [item for item in context.selected_objects if item.type == "EMPTY"]
         layers.make_way_for_handle(source)
         is_new = not selected or self.place != "AUTO" or source.mode == "EDIT"
@@ -87,7 +88,7 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
             entry.group = group if self.kind == "GROUP" else ""
         if is_new:
             select_alone(context, selected[0])  # to be moved at once
-        held_counts.count_inside(context, source)
+        held_counts.count_for(self, context, source)
         for other in sorted(item.name for item in others):
             text = translated("Handles of {other} were taken over by {name}", other=other, name=source.name)
             self.report({"WARNING"}, text)
@@ -111,7 +112,7 @@ class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
         for name in names:
             bones.add(source, rig, name, groups)
         is_asked = self.bones == "SELECTED"
-        held_counts.count_inside(context, source, at_once=not is_asked)
+        held_counts.count_for(self, context, source, at_once=not is_asked)
         if not is_asked:
             names = bones.keep_holding(source, rig, names)
             error = bones.unposed(context, source)
@@ -141,7 +142,7 @@ class ARAPFIELDS_OT_mirror_handle(HandleOperator, bpy.types.Operator):
                 bones.mirror(context, source, entry)
             else:
                 empties.mirror(context, source, entry, "XYZ".index(self.axis))
-        held_counts.count_inside(context, source)
+        held_counts.count_for(self, context, source)
         return translated("Handles mirrored: {count}", count=len(entries))
 
 
@@ -165,7 +166,7 @@ class ARAPFIELDS_OT_set_rest(RestOperator, bpy.types.Operator):
         entries = self.entries(context, source)
         for entry in entries:
             empties.store_rest(source, entry)
-        held_counts.count_inside(context, source)
+        held_counts.count_for(self, context, source)
         return translated("Rest poses stored: {count}", count=len(entries))
 
 

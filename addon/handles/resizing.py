@@ -75,7 +75,7 @@ class ARAPFIELDS_OT_resize_handle(Guided, bpy.types.Operator):
 
     def finish(self, context):
         context.view_layer.update()
-        held_counts.count_inside(context, boxed(context)[0])
+        held_counts.count_for(self, context, boxed(context)[0])
         return {"FINISHED"}
 
     def invoke(self, context, event):

@@ -18,9 +18,9 @@ class Former(NamedTuple):
 
 
 def display_of(context, source, surface, earlier):
-    """The display of a new session: the earlier session's if both are in place, else a new one."""
+    """The display of a new session: the earlier session's if both are in the same place, else a new one."""
     display = earlier.display if earlier else None
-    if display is not None and display.in_place and surface.in_place:
+    if display is not None and display.in_place == surface.in_place:
         display.bind(context, source)
         return display
     if display is not None:

@@ -27,8 +27,11 @@ class LiveModifier:
 
     def bind(self, context, source):
         """Binds the modifier, also after an edit of the source; `before` stays as it is."""
-        motion.bind(context, source)
+        motion.bind(context, source, live=True)
         visibility.show_alone(source, source, for_now=True)
+
+    def is_there(self):
+        return True
 
     @property
     def arrays(self):
@@ -55,6 +58,7 @@ class LiveModifier:
             visibility.give_back(source)
             if source.mode != "EDIT":
                 motion.restore(source, self.before)
+                motion.drop_empty_helper(source)
                 if self.before is not None:
                     settings_of(source).moved_by = self.moved_by
                 if not self.was_silent:
@@ -68,6 +72,7 @@ class LiveModifier:
         settings = settings_of(source)
         settings.live_kind = ""
         stored.put_mark(source, "")
+        motion.drop_empty_helper(source)
         visibility.forget(source)
         result, shape = settings.result, self.shown
         is_placed = result in ("REPLACE", "KEY") and shape is not None

@@ -3,8 +3,8 @@
 
 import bpy
 
-from ..blender import mesh_arrays
-from ..blender.object_references import ObjectReference, settings_of
+from ..blender import mesh_arrays, modifier_stack, undo_steps
+from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..core.errors import UserError
 from ..results import result_objects, visibility
 
@@ -17,6 +17,7 @@ class LiveObject:
     in_place, arrays = False, ()
 
     def __init__(self, context, source, surface):
+        undo_steps.refuse_new(source)
         mesh = result_objects.shown_mesh(context, source, len(surface.local))
         active, selected = context.view_layer.objects.active, list(context.selected_objects)
         item = result_objects.show(context, source, LIVE, LIVE, mesh, {"output": LIVE}, select=False)
@@ -25,6 +26,21 @@ class LiveObject:
         for other in selected:
             other.select_set(True)
         self.result = ObjectReference(item)
+
+    def bind(self, context, source):
+        """Gives the object the source's present vertices and faces, unless it shows an implicit surface."""
+        item = self.result.get()
+        if settings_of(source).output == "WARP" and item.mode != "EDIT":
+            shown = modifier_stack.mesh_copy(context, source)
+            try:
+                if not mesh_arrays.same_topology(item.data, shown):
+                    mesh_arrays.take_all(item.data, shown)
+            finally:
+                bpy.data.meshes.remove(shown)
+
+    def is_there(self):
+        """Whether the object is in the step that was undone to."""
+        return in_scene(self.result.find())
 
     def require(self, source):
         """Raises UserError if the user has deleted the object."""

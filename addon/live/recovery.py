@@ -8,6 +8,7 @@ import bpy
 from ..blender import timers
 from ..blender.language import translated
 from ..blender.object_references import in_scene, settings_of
+from ..carried import carrying
 from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..field_modifier import motion
@@ -20,6 +21,8 @@ from .sessions import is_live, live, poll_live, take_away
 def after_undo():
     """Handler of undo and redo: sessions continue with the step's data; those of the step are restarted."""
     live.returning.clear()
+    live.paused.clear()
+    tag_written()
     recover(bring_back)
     if live.returning:
         timers.start(poll_live, persistent=True)
@@ -28,6 +31,16 @@ def after_undo():
 def after_load():
     """Load handler: objects that were live when the file was saved become results."""
     recover(adopt)
+
+
+def tag_written():
+    """Has Blender evaluate what live mode has moved: undo does so for changes up to the last step alone."""
+    uids = carrying.written | {former.uid for former in live.past.values()} | set(live)
+    for item in bpy.data.objects if uids else ():
+        if item.session_uid in uids and item.library is None:
+            item.update_tag()
+            if item.data is not None:
+                item.data.update_tag()
 
 
 def recover(clear):
@@ -40,7 +53,7 @@ def recover(clear):
             live.part_with(uid)
             if settings is not None and not settings.live_kind and session.display.in_place:
                 session.display.leave(source)
-            if not session.display.in_place:
+            if not session.display.in_place and (settings is None or not settings.live_kind):
                 take_away(session)
         else:
             session.restored()  # its motion may have been undone
@@ -57,7 +70,7 @@ def bring_back(source):
     former = live.past.get(number)
     if former is not None and former.uid != source.session_uid:
         return forget_copy(source)
-    if former is None or not former.display.in_place:
+    if former is None or not former.display.is_there():
         stored.put_mark(source, "")
         return discard_live_object(source)
     live.past.keep(number, former)
@@ -69,7 +82,11 @@ def disown(item):
     """Ends the live state of an object without a session: a duplicate of a live object, or one linked or
     appended from another file."""
     settings = settings_of(item)
-    if not settings.live_kind or is_live(item) or item.session_uid in (live.begun, *live.returning):
+    if (
+        not settings.live_kind
+        or is_live(item)
+        or item.session_uid in (live.begun, *live.returning, *live.paused)
+    ):
         return
     if any(session.number == settings.live_number for session in live.values()):
         forget_copy(item)

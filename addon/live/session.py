@@ -52,6 +52,7 @@ class Session:
         self.touching = None  # (k, 3) contact points of the shape on display, in local coordinates
         self.is_restored = earlier is not None  # whether the shape in the file may be the current request's
         self.is_held = False  # whether that shape counts as the request's without a comparison
+        self.is_back = False  # whether undo has brought it back, and it has not shown a shape since
         self.is_quiet = False  # whether solved shapes stay hidden until a handle moves
         self.display = display_of(context, source, self.reader.surface, earlier)
         self.carrying.bind(context, earlier.carried if earlier else None)

@@ -9,7 +9,7 @@ import contextlib
 
 import bpy
 
-from ..blender import modifier_stack, timers
+from ..blender import modifier_stack, property_definitions, timers, undo_steps
 from ..blender.language import about
 from ..blender.object_references import in_scene, settings_of
 from ..blender.redraw import redraw
@@ -38,6 +38,9 @@ class Sessions(dict):
         self.past = Kept(lambda former: former.display.arrays)
         self.shown_scene = ShownScene()
         self.returning = {}  # {session_uid of a source: Former}, to be restarted after undo
+        # session_uids of sources that are live in the step that was undone to, but cannot be now: the step is
+        # left as it is, since what is wrong there is mended by a further undo.
+        self.paused = set()
 
     def part_with(self, uid):
         """Stops a session, which undo may restart; returns it, or None."""
@@ -52,6 +55,7 @@ class Sessions(dict):
         self.is_rendering = False
         self.past.clear()
         self.returning.clear()
+        self.paused.clear()
         for uid in list(self):
             session = self.pop(uid)
             session.stop()
@@ -75,7 +79,9 @@ def begin(context, source, kind="DEFORM", keeps_shape=False):
     end_for_kind(context, source, kind)
     live.begun = source.session_uid
     earlier, session = live.part_with(source.session_uid), None
-    former = live.returning.pop(source.session_uid, None) if earlier is None else earlier.former
+    returned = None if earlier else live.returning.pop(source.session_uid, None)
+    former = earlier.former if earlier else returned
+    live.paused.discard(source.session_uid)
     if former is None or settings_of(source).live_kind != kind:
         settings_of(source).held = ""
     gone = layers.make_way(source, kind) if former is None else former.gone
@@ -84,13 +90,17 @@ def begin(context, source, kind="DEFORM", keeps_shape=False):
         session.advance()  # a small mesh is read at once
         warn(session)
     except UserError:
-        if session or earlier:
+        if returned is not None:
+            live.paused.add(source.session_uid)
+            live.past.keep(settings_of(source).live_number, returned)
+        elif session or earlier:
             take_away(session or earlier)
         else:
             layers.put_back(context, source, gone)
         raise
     finally:
         live.begun = None
+    session.is_back = returned is not None
     if session.display.in_place:
         layers.note(source, kind)
     live[source.session_uid] = session
@@ -127,6 +137,7 @@ def end(context, source, keep=False):
     """Ends live mode: the source looks as before; or the shape stays (`keep`), and its object is returned."""
     session = live.get(source.session_uid)
     if session is None:
+        forget_paused(source)
         return None
     if keep or session.keeps_shape:
         with contextlib.suppress(UserError, ValueError, ReferenceError):
@@ -138,6 +149,13 @@ def end(context, source, keep=False):
     return None
 
 
+def forget_paused(source):
+    """Ends the live state that the file or a step of undo has, without a session."""
+    live.paused.discard(source.session_uid)
+    if settings_of(source).live_kind:  # any write tags the object as updated
+        settings_of(source).live_kind = ""
+
+
 def end_for_job(context, source, output, result):
     """Ends live mode before a job with that output and result; True if the source was live.
 
@@ -146,7 +164,7 @@ def end_for_job(context, source, output, result):
     """
     session = live.get(source.session_uid)
     if session is None:
-        settings_of(source).live_kind = ""  # set in the file or by undo, without a session
+        forget_paused(source)
         return False
     stays = session.display.in_place and settings_of(source).result == result
     end(context, source, keep=stays and placement.keeps_mesh(output, result))
@@ -159,6 +177,7 @@ def stop_all():
     live.is_rendering = False
     live.past.clear()
     live.returning.clear()
+    live.paused.clear()
     while live:
         live.popitem()[1].stop()
 
@@ -167,6 +186,7 @@ def update(context, wait=0.0, refined=False):
     """Updates every session once; waits at most `wait` seconds for each shape."""
     return_all(context)
     live.shown_scene.follow(context, live.values())
+    has_ended = False
     for uid, session in list(live.items()):
         try:
             session.update(context)
@@ -175,9 +195,14 @@ def update(context, wait=0.0, refined=False):
             session.show()
             warn(session)
         except SourceChanged:
-            restart(context, uid, session)
+            with undo_steps.between():
+                has_ended |= not restart(context, uid, session)
         except (UserError, ValueError, ReferenceError) as error:
-            end_with_error(uid, session, error)
+            has_ended |= end_with_error(uid, session, error)
+        else:
+            session.is_back = False
+    if has_ended:
+        undo_steps.push("Live")
 
 
 def settle(context, uid):
@@ -196,17 +221,22 @@ def warn(session):
 
 
 def end_with_error(uid, session, error):
-    """Ends a session and reports the error; undo may restart it. A deleted source is left as it is."""
+    """Ends a session and reports the error; undo may restart it. A deleted source is left as it is, and one
+    that undo has just brought back. Returns whether the scene has changed."""
     source = session.source.find()
     live.part_with(uid)
-    if not session.display.in_place or source is None or in_scene(source):
+    changes = not session.is_back and (not session.display.in_place or source is None or in_scene(source))
+    if changes:
         take_away(session)
+    elif session.is_back:
+        live.paused.add(uid)
     jobs.add_message("ERROR", about(session.source.name, UserError("{error}; live mode ended", error=error)))
+    return changes
 
 
 def take_away(session):
     """Removes the live shape, even if undo has unlinked the source or the shape from all scenes."""
-    with contextlib.suppress(UserError, ReferenceError, AttributeError):
+    with contextlib.suppress(UserError, ReferenceError, AttributeError), undo_steps.unused_kept():
         session.take_away(session.source.find())
 
 
@@ -218,13 +248,34 @@ def watch(depsgraph):
             session.edits.note(updates)
 
 
+def follow_place(settings):
+    """Update callback of what the result is made of and where it goes: a live shape goes there at once, in
+    the step of undo of that change."""
+    session = live.get(settings.id_data.session_uid)
+    if session is not None and session.display.in_place != settings.in_place:
+        restart(bpy.context, settings.id_data.session_uid, session)
+
+
+property_definitions.listeners["place"] = follow_place
+
+
+def renew(context, source):
+    """The same after what else is shown by new data: the source carries another object."""
+    session = live.get(source.session_uid)
+    if session is not None:
+        restart(context, source.session_uid, session)
+
+
 def restart(context, uid, session):
-    """Sets the solver up anew after an edit of the source or its handles; the shape stays on display."""
+    """Sets the solver up anew after an edit of the source or its handles; the shape stays on display. Returns
+    whether that was possible."""
     source = session.source.get()
     try:
         begin(context, source, session.kind, session.keeps_shape)
     except UserError as error:
         jobs.add_message("ERROR", about(source.name, UserError("{error}; live mode ended", error=error)))
+        return False
+    return True
 
 
 def return_all(context):
@@ -232,9 +283,9 @@ def return_all(context):
     for source in [one for one in live.returning and bpy.data.objects if one.session_uid in live.returning]:
         former, kind = live.returning[source.session_uid], settings_of(source).live_kind
         try:
-            begin(context, source, kind, former.keeps_shape)
+            with undo_steps.between():
+                begin(context, source, kind, former.keeps_shape)
         except UserError as error:
-            settings_of(source).live_kind = ""
             jobs.add_message("ERROR", about(source.name, error))
     live.returning.clear()
 

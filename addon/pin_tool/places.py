@@ -34,13 +34,13 @@ def find(context, source, location, radius, face=None, face_count=None):
     `face` is that of the shown mesh, which has `face_count` of them: where the mesh before the field has as
     many, the place is looked for in that face alone.
     """
-    world = matrix_of(source)
+    world, rest = matrix_of(source), None
+    if modifier_stack.find(source) is not None:
+        with modifier_stack.evaluated_mesh(context, source, in_place=True) as still:
+            rest = transform(world, mesh_arrays.positions(still))
     with modifier_stack.moved_mesh(context, source) as mesh:
         now = transform(world, mesh_arrays.positions(mesh))
-        rest = now
-        if modifier_stack.find(source) is not None:
-            with modifier_stack.evaluated_mesh(context, source, in_place=True) as still:
-                rest = transform(world, mesh_arrays.positions(still))
+        rest = now if rest is None else rest
         faces = point_data.face_count(mesh)
         if not faces:
             nearest = int(((now - location) ** 2).sum(axis=1).argmin())

@@ -44,7 +44,7 @@ class ARAPFIELDS_OT_apply_as_shape_key(FieldOperator, bpy.types.Operator):
         return super().refuses(source) or placement.refusal(source, "WARP", "KEY")
 
     def change(self, context, source):
-        layers.uncover(source)
+        layers.uncover(source, baked=True)
         with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
             before = mesh_arrays.positions(mesh)
         with modifier_stack.moved_mesh(context, source) as mesh:
@@ -63,7 +63,7 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
     bl_label = "Remove"
 
     def change(self, context, source):
-        layers.uncover(source)
+        layers.uncover(source, baked=True)
         followers = Followers(context, source) if settings_of(source).moved_by == "WRAP" else None
         try:
             if not modifier_stack.layers(source):

@@ -23,7 +23,7 @@ def rig_of(context):
 
 def followed(item):
     """The armatures that deform a mesh object, by a modifier or as its parent."""
-    rigs = [m.object for m in item.modifiers if m.type == "ARMATURE" and m.object is not None]
+    rigs = [rig for rig in map(modifier_stack.rig_of, item.modifiers) if rig is not None]
     return rigs + ([item.parent] if is_posed_by_parent(item) else [])
 
 

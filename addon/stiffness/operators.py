@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender import vertex_groups
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import choice
 from ..blender.source_operator import SourceOperator
@@ -27,7 +28,10 @@ class ARAPFIELDS_OT_stiffness_preset(SourceOperator, bpy.types.Operator):
 
     def change(self, context, source):
         settings = settings_of(source).stiffness
-        settings.group = settings.group or source.vertex_groups.active.name
+        group = settings.group or vertex_groups.active_name(source)
+        if not group:
+            raise vertex_groups.none_chosen(source)
+        settings.group = group
         settings.bend_group = settings.group
         settings.times, settings.bend_times = PRESETS[self.material][2]
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Copies of a source's armatures and carried objects for a target, and their references."""
 
-from ..blender import references
+from ..blender import modifier_stack, references
 from ..blender.actions import own_action
 from ..blender.object_references import settings_of
 
@@ -9,11 +9,8 @@ from ..blender.object_references import settings_of
 def pairs(source, target):
     """{armature of the source: that of the target}, by modifiers of the same name."""
     both = [(given, target.modifiers.get(given.name)) for given in source.modifiers]
-    return {
-        given.object: there.object
-        for given, there in both
-        if there is not None and given.type == there.type == "ARMATURE" and there.object is not None
-    }
+    rigs = [[one and modifier_stack.rig_of(one) for one in pair] for pair in both]
+    return {own: other for own, other in rigs if own is not None and other is not None}
 
 
 def counterparts(source, target):

@@ -138,7 +138,7 @@ class Transfer:
             return 0
         done, made = 0, {}
         for given in self.source.modifiers:
-            if given.type != "ARMATURE" or given.object is None:
+            if modifier_stack.rig_of(given) is None:
                 continue
             if not settings_of(given.object).rest_bones:
                 self.notes.append(translated("the bones of {rig} are not fitted", rig=given.object.name))

@@ -10,6 +10,7 @@
 #include "solve/report.h"
 #include "solve/setup.h"
 #include "solve/trained/invertible_objective.h"
+#include "solve/warnings.h"
 #include "tensors/device.h"
 
 namespace arapfields {
@@ -46,6 +47,7 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
   terms.barrier = options.surface.barrier;
   terms.barrier_threshold = options.surface.barrier_threshold;
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
+  require_within_reach(terms.handles, samples.points);
   terms.pull = options.handles;
   terms.weights = energy_weights(samples, terms.handles);
   if (options.exact_handles) terms.pull.handle_weight = 0.0;

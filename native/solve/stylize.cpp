@@ -6,6 +6,7 @@
 #include "solve/radial/full_solve.h"
 #include "solve/report.h"
 #include "solve/setup.h"
+#include "solve/warnings.h"
 
 namespace arapfields {
 namespace {
@@ -66,6 +67,7 @@ Solution stylize(const SurfaceSamples& samples, const Style& style, const Styliz
   const Handle lowest = lowest_point(samples, up);
   terms.handles = handles.empty() ? BoundHandles({lowest}, samples.points)
                                   : BoundHandles(in_cube(handles, samples.frame), samples.points);
+  require_within_reach(terms.handles, samples.points);
   terms.weights = energy_weights(samples, terms.handles);
   terms.pull = options.handles;
   if (handles.empty()) {

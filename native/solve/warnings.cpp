@@ -4,10 +4,12 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/errors.h"
+
 namespace arapfields {
 namespace {
 
-constexpr double far_in_sizes = 5.0;
+constexpr double far_in_sizes = 5.0, farthest_in_sizes = 1e6;
 
 std::string number(double value) {
   char text[32];
@@ -23,11 +25,19 @@ std::optional<FarTarget> far_target(const BoundHandles& handles, PointsIn sample
   for (Index i = 0; i < handles.count(); ++i) {
     const Index begin = handles.begin(i), rows = handles.begin(i + 1) - begin;
     const Points way = handles.targets().middleRows(begin, rows) - handles.sources().middleRows(begin, rows);
-    const double sizes = way.rowwise().norm().maxCoeff() / size;
+    const double sizes = way.rowwise().stableNorm().maxCoeff() / size;
     if (std::isfinite(sizes) && sizes > farthest.sizes) farthest = {i, sizes};
   }
   if (farthest.handle < 0) return std::nullopt;
   return farthest;
+}
+
+void require_within_reach(const BoundHandles& handles, PointsIn samples) {
+  const std::optional<FarTarget> far = far_target(handles, samples);
+  if (far)
+    require(far->sizes <= farthest_in_sizes, "handles[" + std::to_string(far->handle) + "]",
+            "its target is " + number(far->sizes) + " times the shape's size away from its place at rest",
+            "at most " + number(farthest_in_sizes) + " times is allowed");
 }
 
 std::vector<std::string> warnings_on(const Distortion& distortion, const std::optional<FarTarget>& far,

@@ -19,6 +19,9 @@ struct FarTarget {
 /// The farthest of them, if any is far.
 std::optional<FarTarget> far_target(const BoundHandles& handles, PointsIn samples);
 
+/// InvalidInput for a target that is too far for the arithmetic to follow: a million sizes of the shape.
+void require_within_reach(const BoundHandles& handles, PointsIn samples);
+
 /// Sentences that warn of folds at the measured samples, of a far target, and of point handles that were
 /// brought onto the surface.
 std::vector<std::string> warnings_on(const Distortion& distortion, const std::optional<FarTarget>& far,

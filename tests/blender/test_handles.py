@@ -158,3 +158,34 @@ def test_a_mirrored_group_takes_the_other_sides_group():
     bar.arapfields.active_handle = 1
     with pytest.raises(RuntimeError, match=r"no vertex group arm\.L"):
         bpy.ops.arapfields.mirror_handle()
+
+
+def test_groups_without_an_active_one_do_no_harm():
+    """As after Blender's Join of a mesh with groups into one without."""
+    one, two = scenes.bar("One"), scenes.bar("Two")
+    two.vertex_groups.new(name="Group").add([0, 1, 2], 1.0, "REPLACE")
+    scenes.activate(two, one)
+    bpy.ops.object.join()
+    assert one.vertex_groups and one.vertex_groups.active is None
+    assert bpy.ops.arapfields.add_handle(kind="CUBE") == {"FINISHED"} and len(one.arapfields.handles) == 1
+    scenes.activate(one)
+    for call in (
+        lambda: bpy.ops.arapfields.add_handle(kind="GROUP", place="CURSOR"),
+        bpy.ops.arapfields.stiffness_preset,
+    ):
+        with pytest.raises(RuntimeError, match="One: choose a vertex group"):
+            call()
+
+
+def test_a_handle_whose_group_is_cleared_is_named():
+    bar, _, _ = scenes.bar_with_handles()
+    bar.vertex_groups.new(name="Group").add(list(range(30)), 1.0, "REPLACE")
+    bpy.ops.arapfields.add_handle(kind="GROUP", group="Group")
+    bar.arapfields.handles[-1].group = ""
+    scenes.activate(bar)
+    for operator in (bpy.ops.arapfields.deform, bpy.ops.arapfields.live, bpy.ops.arapfields.bake):
+        with pytest.raises(RuntimeError, match="Bar: choose a vertex group"):
+            operator()
+    bar.vertex_groups.clear()
+    with pytest.raises(RuntimeError, match="Bar has no vertex group"):
+        bpy.ops.arapfields.deform()

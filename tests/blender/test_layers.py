@@ -16,7 +16,7 @@ if IN_BLENDER:
 
     from addon.blender import modifier_stack
     from addon.core.runtime import jobs
-    from addon.field_modifier import layers
+    from addon.field_modifier import cache_modifier, layers
     from addon.live import sessions
     from addon.pin_tool import drag
     from addon.solver import setup
@@ -164,3 +164,44 @@ def test_handles_that_are_added_while_a_style_is_live_leave_it_live(way):
     moving.location.z += 0.3
     step(refined=True)
     assert np.abs(scenes.world_points(bar) - shape).max() > 0.02 and len(modifier_stack.layers(bar)) == 1
+
+
+@pytest.mark.parametrize("last", ["stylize", "wrap", "live"])
+@pytest.mark.parametrize("kind", ["PC2", "MDD"])
+def test_what_was_baked_gives_way_to_a_new_run_below(tmp_path, kind, last):
+    """Both results below the bake's modifier go, which is off then: nothing waits for its removal."""
+    bar, _, _ = styled()
+    with_handles(bar).location.z += 0.3
+    bpy.context.view_layer.update()
+    bpy.ops.arapfields.deform(**QUICK)
+    given = {"range": "CUSTOM", "start": 1, "end": 2}
+    assert bpy.ops.arapfields.bake(folder=str(tmp_path), format=kind, **given) == {"FINISHED"}
+    assert [len(modifier_stack.layers(bar)), cache_modifier.is_playing(bar)] == [1, True]
+    if last == "wrap":
+        bar.arapfields.wrap.onto = scenes.bar("Target")
+        bpy.data.objects["Target"].scale.y = 1.5
+        bpy.context.view_layer.update()
+        scenes.activate(bar)
+        run, given = bpy.ops.arapfields.wrap, {"samples": 300, "centers": 20, "stages": 1, "iterations": 2}
+    elif last == "live":
+        run, given = bpy.ops.arapfields.live, {"kind": "STYLIZE"}
+    else:
+        run, given = bpy.ops.arapfields.stylize, STYLE
+    assert run(**given) == {"FINISHED"}
+    assert not modifier_stack.layers(bar) and not cache_modifier.is_playing(bar)
+    assert sum(map(modifier_stack.is_field, bar.modifiers)) == 1
+    if last == "live":
+        scenes.activate(bar)
+        assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
+        assert len(modifier_stack.layers(bar)) == 1 and cache_modifier.is_playing(bar)
+
+
+@pytest.mark.parametrize("result", ["REPLACE", "KEY"])
+def test_a_result_on_the_mesh_takes_off_layers_below_a_bake(tmp_path, result):
+    bar, _, _ = styled()
+    with_handles(bar).location.z += 0.3
+    bpy.context.view_layer.update()
+    given = {"range": "CUSTOM", "start": 1, "end": 2, "folder": str(tmp_path), "format": "PC2"}
+    assert bpy.ops.arapfields.bake(**given) == {"FINISHED"}
+    assert bpy.ops.arapfields.deform(**QUICK, result=result) == {"FINISHED"}
+    assert modifier_stack.find(bar) is None and len(modifier_stack.layers(bar)) == (result == "KEY")

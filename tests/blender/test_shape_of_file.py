@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is shown is a function of what the file says: by a short walk, and by what hands once found."""
+"""What is shown is a function of what the file says: what hands and walks (tests/fuzz/walk) once found."""
 
 import functools
 
@@ -16,7 +16,6 @@ if IN_BLENDER:
     from addon.live import live_solver, sessions
     from addon.pin_tool import drag
     from tests.blender.walk import world
-    from tests.blender.walk.rule import Walk
 
 pytestmark = pytest.mark.in_blender
 
@@ -36,14 +35,6 @@ def few_centers(test):
             end()
 
     return wrapped
-
-
-@few_centers
-def test_a_walk():
-    """The long one: `python -m tests.blender.walk`."""
-    walk, taken = Walk(4, 1e-5), 0
-    while taken < 40:
-        taken += walk.step()
 
 
 def push(message):

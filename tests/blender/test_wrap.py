@@ -23,6 +23,9 @@ if IN_BLENDER:
 
 pytestmark = pytest.mark.in_blender
 
+ALIKE = 0.05  # between wraps from samples of the mesh and of its implicit surface, in units of the scene
+ROUNDED = 0.2  # what a coarse grid takes off an object of three units
+
 
 def test_the_object_comes_to_lie_on_the_target_and_the_factor_goes_back():
     """The object itself goes there: the factor changes its shape alone."""
@@ -246,3 +249,26 @@ def test_bones_that_cannot_be_fitted_and_wraps_that_fail_leave_the_stack():
     assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
     assert any("The bones of Rig stay" in str(text) for text in jobs.messages())
     assert np.array_equal(joints(rig, posed=False), rest)
+
+
+@pytest.mark.parametrize("output", ["SURFACE", "REMESH"])
+def test_a_remeshed_wrap_lies_where_the_warped_one_lies(output):
+    """The new object's place is the similarity of the mesh's own motion, whatever it is made of."""
+    places = {}
+    for kind in ("WARP", output):
+        item, _ = bar_and_target()
+        settings = item.arapfields
+        settings.output, settings.result, settings.resolution = kind, "NEW", 24
+        assert settings.wrap.move_object
+        assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
+        made = bpy.data.objects["Bar_wrapped"]
+        places[kind] = np.array(made.matrix_world), scenes.world_points(made)
+        for one in (made, item, bpy.data.objects["Scan"]):
+            bpy.data.objects.remove(one)
+    (place, points), (other_place, other_points) = places.values()
+    assert np.abs(place - other_place).max() < ALIKE
+    low, high = points.min(axis=0), points.max(axis=0)
+    assert (
+        np.abs(other_points.min(axis=0) - low).max() < 0.2
+        and np.abs(other_points.max(axis=0) - high).max() < 0.2
+    )

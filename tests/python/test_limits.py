@@ -10,6 +10,7 @@ import threading
 import numpy as np
 import pytest
 from support.files import archives
+from support.geometry.cases import bar_samples
 
 import arapfields as af
 
@@ -152,3 +153,26 @@ def test_a_sparse_file_asks_for_no_memory(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True)
     assert done.returncode == 0 and "GiB" in done.stdout and str(path) in done.stdout, done
+
+
+@pytest.mark.parametrize("far", [1e8, 1e30, 1e200])
+@pytest.mark.parametrize("field", ["radial", "neural"])
+def test_a_target_that_no_number_can_follow_is_refused(far, field):
+    samples, rest = bar_samples(), np.diag([0.3, 0.6, 0.6, 1.0])
+    target = rest.copy()
+    target[0, 3] = far
+    held = af.CuboidHandle(rest, rest)
+    refused = (
+        r"handles\[1\]: its target is .* times the shape's size away .*; at most 1e\+06 times is allowed"
+    )
+    options = {"iterations": 2, "width": 8, "layers": 1, "batch": 50}
+    for moved in (af.CuboidHandle(rest, target), af.PointHandle([0, 0, 0], [0, 0, far])):
+        with pytest.raises(af.InvalidInput, match=refused):
+            af.deform(samples, [held, moved], af.DeformOptions(field=field, **options))
+        with pytest.raises(af.InvalidInput, match=refused):
+            style = af.StylizeOptions(field=field, **options)
+            af.stylize(samples, "cube", style, handles=[held, moved])
+    live = af.LiveDeformer(samples, [held], af.LiveOptions(samples=60, coarse_centers=4, fine_centers=8))
+    with pytest.raises(af.InvalidInput, match=refused.replace("1", "0", 1)):
+        live.solve([target])
+    assert live.solve([rest]) is not None

@@ -6,6 +6,7 @@
 #include "sampling/sample_choice.h"
 #include "solve/radial/handle_motion.h"
 #include "solve/setup.h"
+#include "solve/warnings.h"
 
 namespace arapfields {
 namespace {
@@ -24,6 +25,7 @@ constexpr Index most_places = 256;
 
 void HandleTerms::set(const std::vector<Handle>& handles) {
   bound_ = BoundHandles(in_cube(handles, problem_.frame()), problem_.surface());
+  require_within_reach(bound_, problem_.surface());
   handles_ = handles;
   reaches_ = reaches();
   update_influence();
@@ -32,6 +34,7 @@ void HandleTerms::set(const std::vector<Handle>& handles) {
 
 void HandleTerms::set_targets(const std::vector<Handle>& moved) {
   bound_.retarget(in_cube(moved, problem_.frame()));
+  require_within_reach(bound_, problem_.surface());
   for (std::size_t i = 0; i < handles_.size(); ++i) {
     handles_[i].target = moved[i].target;
     handles_[i].target_point = moved[i].target_point;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The walk's scene, and what is shown of it beside what the file says should be."""
+"""The scene of a walk of shapes (tests/fuzz/walk), and what is shown beside what the file says should be."""
 
 import hashlib
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rule that a walk checks: what is shown is a function of what the file says, never of how one got there.
+"""The rule of a walk of shapes: what is shown is a function of what the file says, not of how one got there.
 
 After undo, redo and load the shape is the stored one, bit for bit. Of a live object it is a fresh solve's,
 from rest; where it is not live, nothing but a result moves it. A press without a move holds what is shown.
@@ -8,10 +8,11 @@ from rest; where it is not live, nothing but a result moves it. A press without 
 import bpy
 import numpy as np
 
+from addon.blender import undo_steps
 from addon.blender.object_references import settings_of
+from tests.blender.walk import world
 
-from . import world
-from .steps import CHANGES, OTHERS, Steps
+from .steps import Steps
 
 MOVES = {"drag", "pin", "transform", "place_source", "delete_pin", "live", "keep", "solve", "wrap"}
 MAY_MOVE = {"setting", "style"}  # a held shape, where live mode follows what was changed
@@ -22,12 +23,11 @@ class Broken(Exception):
     """The rule is broken: by which step, at what, and by how much."""
 
 
-class Walk:
-    """A seeded walk through a scene of its own; `tolerance`: of a live shape, as a share of the size."""
+class Shapes:
+    """A walk of shapes. `tolerance`: of a live shape, as a share of the size."""
 
-    def __init__(self, seed, tolerance):
-        self.rng, self.tolerance = np.random.default_rng(seed), tolerance
-        self.steps, self.said = Steps(self.rng), []
+    def __init__(self, _, tolerance=1e-5):
+        self.tolerance, self.steps = tolerance, Steps()
         world.build()
         self.begin()
 
@@ -42,24 +42,20 @@ class Walk:
         shapes = {item.name: world.shape(item) for item in world.sources()}
         return world.everything(), shapes, held
 
-    def step(self):
-        """One step, and whether the rule holds after it."""
-        before = self.history[self.position]
-        table = CHANGES | OTHERS
-        odds = np.array(list(table.values()))
-        name = str(self.rng.choice(list(table), p=odds / odds.sum()))
-        if (name == "undo" and self.position == 0) or (name == "redo" and self.at_end()):
-            return False
-        items = world.sources()
-        source = items[self.rng.integers(len(items))]
-        old = source.name
-        said = self.steps.take(name, source)
+    def step(self, name, seed):
+        """Takes a step, after which the rule holds; returns what was done, None if nothing can be."""
+        before, pushed = self.history[self.position], undo_steps.pushed
+        at_end = self.position + 1 == len(self.history)
+        if (name == "undo" and self.position == 0) or (name == "redo" and at_end):
+            return None
+        said = self.steps.take(name, np.random.default_rng(seed))
         if said is None:
-            return False
-        self.said.append(f"{old}: {said}")
+            return None
         if name in ("undo", "redo"):
             self.position += 1 if name == "redo" else -1
             world.settle()
+            if self.history[self.position] is None:
+                self.history[self.position] = self.note({})
             self.require_same(self.history[self.position][0])
         elif name == "save":
             world.settle()
@@ -68,20 +64,15 @@ class Walk:
         else:
             bpy.ops.ed.undo_push(message=name)
             world.settle()
-            held = self.check(name, said, old, before)
+            held = self.check(name, said, self.steps.old, before)
             del self.history[self.position + 1 :]
-            self.history.append(self.note(held))
-            self.position += 1
-            if len(self.history) > 40:
-                del self.history[0]
-                self.position -= 1
+            between = [None] * (undo_steps.pushed - pushed)  # where live mode has ended
+            self.history = [*self.history, *between, self.note(held)][-40:]
+            self.position = len(self.history) - 1
         strays = world.strays()
         if strays:
             raise Broken(f"no Empties of their own: {strays}")
-        return True
-
-    def at_end(self):
-        return self.position + 1 == len(self.history)
+        return f"{self.steps.old}: {said}"
 
     def require_same(self, expected):
         found = world.everything()

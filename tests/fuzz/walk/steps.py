@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The walk's steps, by the operators and calls that the window's gestures make.
+"""The steps of a walk of shapes, by the operators and calls that the window's gestures make.
 
-A step changes the scene as a user does and returns what it did; None where it cannot be done now. What ends
-with a step of Blender's undo is in CHANGES.
+A step changes the scene as a user does and returns what it did; None where it cannot be done now.
 """
 
 import tempfile
@@ -14,8 +13,7 @@ from support.blender import scenes
 
 from addon.live import sessions
 from addon.pin_tool import drag, pins
-
-from . import world
+from tests.blender.walk import world
 
 STYLES = ("CUBE", "OCTAHEDRON", "ICOSAHEDRON", "CYLINDER")
 FRAMES = ("OBJECT", "WORLD", "UPRIGHT")
@@ -23,14 +21,16 @@ SHORT = {"iterations": 20, "samples": 400}
 
 
 class Steps:
-    """`rng` draws them. `source` is the object that the step at hand works on."""
+    """`source` is the object that the step at hand works on, `old` its name before; `rng` is drawn from."""
 
-    def __init__(self, rng):
-        self.rng, self.source = rng, None
+    def __init__(self):
+        self.rng, self.source, self.old = None, None, ""
 
-    def take(self, name, source):
-        self.source = source
-        scenes.activate(source)
+    def take(self, name, rng):
+        self.rng, items = rng, world.sources()
+        self.source = items[rng.integers(len(items))]
+        self.old = self.source.name
+        scenes.activate(self.source)
         return getattr(self, name)()
 
     @property
@@ -209,9 +209,3 @@ class Steps:
             bpy.ops.wm.save_as_mainfile(filepath=f"{folder}/walk.blend")
             bpy.ops.wm.open_mainfile(filepath=f"{folder}/walk.blend")
         return "save and reload"
-
-
-# How often each is drawn, relative to others.
-CHANGES = {"pin": 6, "drag": 8, "transform": 8, "place_source": 2, "live": 6, "keep": 1, "style": 5}
-CHANGES |= {"setting": 3, "delete_pin": 1, "delete": 0.3, "rename": 0.5, "solve": 1.5, "wrap": 0.3, "mode": 1}
-OTHERS = {"undo": 12, "redo": 7, "save": 0.6}
