@@ -78,8 +78,8 @@ class FrameSolver:
 
     @property
     def rest_triangles(self):
-        """(m, 3) triangles whose vertices `rest` are, by which parts that touch are told apart; None: unknown."""
-                return self.sampled.setup.surface.faces if self.sampled.topology is None else None
+        """(m, 3) triangles whose vertices `rest` are, by which touching parts are told apart, or None."""
+        return self.sampled.setup.surface.faces if self.sampled.topology is None else None
 
     def _make_solver(self, handles, energy):
         """Makes the native solver for these handles and energy weights; its field starts at rest."""

@@ -57,9 +57,9 @@ class SourceSurface:
         """The chosen implicit surface; on the worker."""
         return self._exact_surface if self.exact else self.fit.surface(tracker, weight)
 
-        @property
+    @property
     def faces(self):
-        """The triangles whose vertices a field moves, by which it tells touching parts apart; None without any."""
+        """The triangles of the vertices, by which a field tells touching parts apart; None without any."""
         return self.triangles if self.splats is None and len(self.triangles) else None
 
     def samples(self, tracker, count, seed, own_triangles):

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parts of a shape that touch at rest, or nearly, come apart: the field is a function on the surface there."""
+"""Parts of a shape that touch at rest, or nearly, come apart: there the field lives on the surface."""
 
-import arapfields as af
 import numpy as np
 import pytest
 from support.geometry import slit
 from support.geometry.meshes import check_closed
+
+import arapfields as af
 
 GAPS = [0.2, 0.02, 0.004, 0.0]
 # A jaw of size 1 turned by 25° about its hinge; a field of finite resolution rounds the slit's end.
@@ -21,7 +22,7 @@ def solved(gap, **options):
 
 def test_a_slit_bar_is_closed():
     for gap in GAPS:
-        vertices, triangles, jaws = slit.slit_bar(gap)
+        vertices, triangles, _ = slit.slit_bar(gap)
         check_closed(vertices, triangles)
         corners = vertices[triangles]
         volume = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
@@ -50,7 +51,9 @@ def test_a_saved_field_keeps_the_sides(tmp_path):
     vertices, triangles, _, field = solved(0.004)
     field.save(tmp_path / "field.safetensors")
     loaded = af.DeformationField.load(tmp_path / "field.safetensors")
-    assert np.array_equal(loaded.apply(vertices, triangles=triangles), field.apply(vertices, triangles=triangles))
+    assert np.array_equal(
+        loaded.apply(vertices, triangles=triangles), field.apply(vertices, triangles=triangles)
+    )
     assert np.array_equal(loaded(vertices), field(vertices))
 
 

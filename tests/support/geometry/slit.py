@@ -14,8 +14,8 @@ PIVOT = (-0.5, 0.0, 0.0)
 def slit_bar(gap, columns=40, rows=16, layers=6):
     """Vertices (n,3), triangles (m,3) and each vertex's jaw: −1 lower, 1 upper, 0 behind the slit.
 
-    The bar fills [-1,1] × [-0.5,0.5] × [-0.5,0.5]. It is the boundary of a block of hexahedra; in the slit the
-    lower and the upper jaw have vertices of their own, also where they lie in one place.
+    The bar fills [-1,1] × [-0.5,0.5] × [-0.5,0.5]. It is the boundary of a block of hexahedra; in the slit
+    the lower and the upper jaw have vertices of their own, also where they lie in one place.
     """
     x = np.linspace(-1.0, 1.0, columns + 1)
     y = np.linspace(-0.5, 0.5, rows + 1)
