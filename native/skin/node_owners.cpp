@@ -74,6 +74,7 @@ std::vector<Index> NodeOwners::own_bones() const {
 void NodeOwners::see(Skeleton& skeleton) {
   straight_.resize(graph_.size(), skeleton.count());
   std::vector<std::vector<Length>> paths(skeleton.count(), best_);
+  std::vector<char> in_opening(static_cast<std::size_t>(skeleton.count()));
   const BoneSurroundings surroundings(surfaces_, slots_, slot_count_, spacing_);
   parallel_jobs(skeleton.count(), [&](Index b) {
     const Index around = skeleton.has_open_end(b) ? surface_around(skeleton.bone(b).head) : -1;
@@ -81,6 +82,7 @@ void NodeOwners::see(Skeleton& skeleton) {
     if (around < 0) {
       inside.emplace(skeleton, b, surroundings);
       if (!inside->parts().empty()) skeleton.set_parts(b, inside->parts());
+      in_opening[static_cast<std::size_t>(b)] = inside->is_in_opening() ? 1 : 0;
     }
     for (Index i = 0; i < graph_.size(); ++i) {
       const Vec3 node = surfaces_.points.row(nodes_[i]);
@@ -89,6 +91,7 @@ void NodeOwners::see(Skeleton& skeleton) {
     }
   });
   pulls_.assign(skeleton.count(), false);
+  for (std::size_t b = 0; b < in_opening.size(); ++b) pulls_[b] = in_opening[b] != 0;
   for (const std::vector<Length>& each : paths)
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       if (each[i].second >= 0) pulls_[each[i].second] = true;

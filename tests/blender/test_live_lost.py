@@ -72,7 +72,8 @@ def test_a_modifier_that_was_removed_comes_back_live_with_undo():
     bpy.ops.ed.undo_push(message="removed")
     step()
     assert not sessions.live and "was removed" in str(jobs.messages())
-    bpy.ops.ed.undo()
+    bpy.ops.ed.undo()  # the end of live mode
+    bpy.ops.ed.undo()  # the removal
     step(refined=True)
     bar = bpy.data.objects["Bar"]
     assert sessions.is_live(bar) and np.abs(scenes.world_points(bar) - posed).max() < 1e-4

@@ -100,7 +100,7 @@ def test_the_last_pin_takes_the_motion_with_it():
         pin(bar, (x, 0.0, 0.25), target=(x, 0.0, 0.5))
     for left in (1, 0):
         assert bpy.ops.arapfields.pin_delete() == {"FINISHED"}
-        assert len(bar.arapfields.handles) == left and len(bpy.data.objects) == left + 1
+        assert len(bar.arapfields.handles) == left and len(bpy.context.scene.objects) == left + 1
     assert not bar.modifiers and np.array_equal(scenes.world_points(bar), rest)
     assert bpy.context.view_layer.objects.active == bar
 

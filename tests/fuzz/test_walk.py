@@ -1,30 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A walk through Blender of a new seed each time: no crash, no hang, no error, nothing that leads nowhere.
+"""A walk through Blender: no crash, no hang, no error, nothing that leads nowhere; and the shortening of walks.
 
-Beside it, the shortening of walks that fail.
+The seed is fixed; `make fuzz` takes new ones.
 """
-
-import secrets
 
 from support.blender.inside import require_bpy
 
 from .walk import plan
 from .walk.run import Blender, report
 
-STEPS = 300
+STEPS, SEED = 300, 23
 # What undo leaves otherwise than it was: `make fuzz` reports and shortens it; some of it is known to remain.
 REMAINING = "is not as it was"
 
 
-def test_a_new_walk_keeps_the_rules():
+def test_a_walk_keeps_the_rules():
     require_bpy()
-    seed, blender = secrets.randbelow(1 << 30), Blender()
-    print(f"python -m tests.fuzz.walk --steps {STEPS} --seeds {seed}")
+    blender = Blender()
     try:
-        for walk in plan.draw(seed, STEPS):
+        for walk in plan.draw(SEED, STEPS):
             outcome = blender.take(walk)
             broken = outcome.broken and REMAINING not in outcome.broken
-            assert not broken, f"--seeds {seed} --steps {STEPS}\n{report(outcome)}"
+            assert not broken, f"--seeds {SEED} --steps {STEPS}\n{report(outcome)}"
     finally:
         blender.stop()
 

@@ -238,7 +238,7 @@ def test_a_report_is_of_the_planes_found_last():
     handle, up, few = af.Point(rows[0], rows[0] + 0.1), np.ones(3), {"iterations": 2, "tolerance": 0.1}
     options = af.LiveOptions(samples=50, coarse_centers=5, fine_centers=5, iterations=2, threads=1)
     live = af.LiveDeformer(samples, [handle], options)
-    live.set_secondary_motion(af.SecondaryMotionOptions(), up=up, ground=1e30)
+    live.set_secondary_motion(af.SecondaryMotionOptions(), up=up, ground=1e6)
     live.step([rows[1]], 0.01)
     live.set_style("cube", 0.5, sharpness=5.0, up=up)
     live.set_symmetry("x")
