@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A walk through Blender: no crash, no hang, no error, nothing that leads nowhere; and the shortening of walks.
+"""A walk through Blender: no crash, no hang, no error, nothing that leads nowhere.
+
+And the shortening of walks that fail.
 
 The seed is fixed; `make fuzz` takes new ones.
 """
