@@ -36,7 +36,7 @@ def after_load():
 def tag_written():
     """Has Blender evaluate what live mode has moved: undo does so for changes up to the last step alone."""
     uids = carrying.written | {former.uid for former in live.past.values()} | set(live)
-    for item in bpy.data.objects if uids else ():
+    for item in list(bpy.data.objects) if uids else ():
         if item.session_uid in uids and item.library is None:
             item.update_tag()
             if item.data is not None:

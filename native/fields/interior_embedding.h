@@ -23,7 +23,8 @@ using SurfaceSide = std::int32_t;
 struct ARAPFIELDS_EXPORT NodeSight {
   /// Of node i: nodes that it does not see, others[k] for k from starts[i] to starts[i + 1], each with the
   /// square by which its interior distance exceeds the straight one.
-  std::vector<std::int32_t> starts, others;
+  std::vector<std::int32_t> starts;
+  std::vector<std::int32_t> others;
   std::vector<double> excess;
   double reach = 0.0;             ///< distance up to which nodes are listed
   Points normals = Points(0, 3);  ///< (n,3) of the nodes, unit length

@@ -11,8 +11,6 @@ namespace {
 constexpr Index least_places = 5, most_places = 40;
 /// A bone that no surface encloses may be in one that covers at least so many directions on average.
 constexpr int least_sides = 14;
-/// A bone in the opening of a half covers half of the directions; beside a closed surface fewer are covered.
-constexpr int sides_in_opening = 11;
 /// Least fraction of a bone's view points, up to the last inside of a surface, that are inside of a surface
 /// for the bone to be in it.
 constexpr double share_inside = 0.4;
@@ -151,7 +149,6 @@ void BoneInside::take_most_covering() {
     if (sides > most) most = sides, best = static_cast<std::size_t>(slot);
   }
   Segment& whole = segments_.front();
-  is_in_opening_ = most >= sides_in_opening * static_cast<int>(whole.views.size());
   if (most == 0 || most < least_sides * static_cast<int>(whole.views.size())) return;
   contains_[best] = 1;
   whole.runs[best] = {0, whole.views.size()};

@@ -37,9 +37,6 @@ class BoneInside {
 
   /// Empty if no surface encloses a part of the bone.
   const std::vector<BonePart>& parts() const { return parts_; }
-  /// Whether a bone that no surface encloses lies in the opening of one, as the spine does in one half of a
-  /// body.
-  bool is_in_opening() const { return is_in_opening_; }
   /// Whether a point of the surface with this slot (−1: none) is visible from a part inside of that surface.
   bool sees(const Vec3& point, Index slot) const;
 
@@ -69,7 +66,6 @@ class BoneInside {
   std::vector<Segment> segments_;
   std::vector<char> contains_;  // whether the surface of a slot contains the bone
   std::vector<BonePart> parts_;
-  bool is_in_opening_ = false;
 };
 
 }  // namespace arapfields

@@ -52,7 +52,7 @@ NodeOwners::NodeOwners(const PiecePoints& surfaces, const std::vector<Index>& no
 std::vector<Index> NodeOwners::found(Skeleton& skeleton) {
   see(skeleton);
   spread();
-  take_free_surfaces();
+  take_free_surfaces(skeleton);
   fill();
   for (std::size_t i = 0; i < best_.size(); ++i)
     if (has_bone(i)) own_[piece(i)].insert(best_[i].second);
@@ -74,7 +74,6 @@ std::vector<Index> NodeOwners::own_bones() const {
 void NodeOwners::see(Skeleton& skeleton) {
   straight_.resize(graph_.size(), skeleton.count());
   std::vector<std::vector<Length>> paths(skeleton.count(), best_);
-  std::vector<char> in_opening(static_cast<std::size_t>(skeleton.count()));
   const BoneSurroundings surroundings(surfaces_, slots_, slot_count_, spacing_);
   parallel_jobs(skeleton.count(), [&](Index b) {
     const Index around = skeleton.has_open_end(b) ? surface_around(skeleton.bone(b).head) : -1;
@@ -82,7 +81,6 @@ void NodeOwners::see(Skeleton& skeleton) {
     if (around < 0) {
       inside.emplace(skeleton, b, surroundings);
       if (!inside->parts().empty()) skeleton.set_parts(b, inside->parts());
-      in_opening[static_cast<std::size_t>(b)] = inside->is_in_opening() ? 1 : 0;
     }
     for (Index i = 0; i < graph_.size(); ++i) {
       const Vec3 node = surfaces_.points.row(nodes_[i]);
@@ -91,7 +89,6 @@ void NodeOwners::see(Skeleton& skeleton) {
     }
   });
   pulls_.assign(skeleton.count(), false);
-  for (std::size_t b = 0; b < in_opening.size(); ++b) pulls_[b] = in_opening[b] != 0;
   for (const std::vector<Length>& each : paths)
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       if (each[i].second >= 0) pulls_[each[i].second] = true;
@@ -122,8 +119,9 @@ Index NodeOwners::surface_around(const Vec3& joint) const {
 }
 
 /// A bone in no surface takes the nearest surface without bones, which it may share with others. If no bone
-/// is in a surface, each node belongs to the nearest bone. Any other bone pulls if it touches a surface.
-void NodeOwners::take_free_surfaces() {
+/// is in a surface, each node belongs to the nearest bone. Any other bone pulls if it touches a surface, or
+/// lies behind one, as the spine does in the opening of one half of a body.
+void NodeOwners::take_free_surfaces(const Skeleton& skeleton) {
   std::vector<bool> has_surface(straight_.cols(), false);
   for (const Length& each : best_)
     if (each.second >= 0) has_surface[each.second] = true;
@@ -132,7 +130,10 @@ void NodeOwners::take_free_surfaces() {
   for (Index b = 0; b < straight_.cols(); ++b) {
     Index nearest = 0;
     const float distance = straight_.col(b).minCoeff(&nearest);
-    if (none || distance < static_cast<float>(spacing_)) pulls_[b] = true;
+    const Vec3 node = surfaces_.points.row(nodes_[static_cast<std::size_t>(nearest)]);
+    const Vec3 normal = surfaces_.normals.row(nodes_[static_cast<std::size_t>(nearest)]);
+    const bool is_behind = normal.dot(skeleton.nearest(b, node) - node) < 0.0;
+    if (none || is_behind || distance < static_cast<float>(spacing_)) pulls_[b] = true;
     if (has_surface[b] || has_bone(nearest)) continue;
     pulls_[b] = true;
     for (std::size_t i = 0; i < nodes_.size(); ++i)

@@ -37,7 +37,7 @@ class NodeOwners {
   }
   void see(Skeleton& skeleton);
   Index surface_around(const Vec3& joint) const;
-  void take_free_surfaces();
+  void take_free_surfaces(const Skeleton& skeleton);
   void spread();
   void fill();
   bool lies_about(const Nodes& nodes, const Bone& bone) const;

@@ -75,6 +75,9 @@ ENDED_ELSEWHERE = {  # state that the lifecycle's STATE does not list, and why
     "timers._started": "timers.clear, by STATE, which lists the module",
     "selection.rows": "a flag that is down whenever no row is being chosen",
     "native._state": "the library, which a process loads once",
+    "undo_steps.is_between": "set within a context manager alone",
+    "undo_steps.keeps_unused": "set within a context manager alone",
+    "undo_steps.pushed": "a count of steps that only rises",
     "property_definitions.listeners": "filled while modules are imported, constant afterwards",
 }
 

@@ -203,6 +203,7 @@ def members(t):
             by_name(af.Bone, "deform", "limits", "name"),
             [np.zeros(3), np.ones(3), None, 0.0, True, np.zeros((3, 2)), "spine"],
         ),
+        "coincident_bones": lambda: (af.coincident_bones, [[af.Bone(np.zeros(3), np.ones(3))] * 2]),
         "bone_handles": lambda: (af.bone_handles, [t["samples"], [af.Bone(np.zeros(3), np.ones(3))]]),
         "skin": lambda: (af.skin, [ROWS, np.ones((60, 1)), [np.eye(4)], "linear"]),
         "Task": lambda: (af.Task, []),

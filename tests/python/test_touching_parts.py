@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Parts of a shape that touch at rest, or nearly, come apart: there the field lives on the surface."""
 
+import functools
+
 import numpy as np
 import pytest
+from support.files import archives
 from support.geometry import slit
 from support.geometry.meshes import check_closed
 
@@ -13,10 +16,11 @@ GAPS = [0.2, 0.02, 0.004, 0.0]
 JAW_ERROR = 0.04
 
 
-def solved(gap, **options):
+@functools.cache
+def solved(gap):
     vertices, triangles, jaws = slit.slit_bar(gap)
     samples = af.sample_mesh(vertices, triangles, count=8000)
-    field = af.deform(samples, slit.jaw_handles(), options=af.DeformOptions(**options))
+    field = af.deform(samples, slit.jaw_handles(), options=af.DeformOptions())
     return vertices, triangles, jaws, field
 
 
@@ -55,6 +59,27 @@ def test_a_saved_field_keeps_the_sides(tmp_path):
         loaded.apply(vertices, triangles=triangles), field.apply(vertices, triangles=triangles)
     )
     assert np.array_equal(loaded(vertices), field(vertices))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("sides", 1e6, "whole numbers from 0 to"),
+        ("others", 0.5, "whole numbers from 0 to"),
+        ("starts", 0.0, "rise from 0 to the number of pairs"),
+        ("excess", -1.0, "none may be negative"),
+    ],
+)
+def test_what_nodes_see_is_checked_when_it_is_read(name, value, message, tmp_path):
+    field = solved(0.02)[3]
+    field.save(tmp_path / "whole.safetensors")
+    texts, arrays = archives.read(tmp_path / "whole.safetensors")
+    damaged = arrays[f"embedding.sight.{name}"].copy()
+    damaged[-1] = value
+    content = archives.packed(texts, arrays | {f"embedding.sight.{name}": damaged})
+    (tmp_path / "field.safetensors").write_bytes(content)
+    with pytest.raises(af.InvalidInput, match=message):
+        af.DeformationField.load(tmp_path / "field.safetensors")
 
 
 def test_a_finer_mesh_is_moved_by_its_own_triangles():
