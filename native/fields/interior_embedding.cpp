@@ -34,10 +34,12 @@ constexpr double negligible = -36.0;
 /// is below), in front of the node or hardly behind it (as a share of the width).
 constexpr double facing_widths = 2.0, facing_cosine = -0.3, facing_behind = 1e-3;
 /// Distance, in widths, up to which it matters what a node sees: a point is within one width of its own
-/// node, and a weight of e^{−16} is nothing.
-constexpr double sight_widths = 5.0;
+/// node, and a weight of e^{−9} is little.
+constexpr double sight_widths = 4.0;
+/// Distance, in widths, of a hidden node up to which it may be the nearest one to a point of the other side.
+constexpr double doubtful_widths = 2.5;
 /// Longest interior distance that is looked for, in widths: nodes beyond it have no weight.
-constexpr double longest_widths = 7.0;
+constexpr double longest_widths = 6.0;
 /// Depth of eyes below the surface, in widths.
 constexpr double eye_widths = 0.15;
 /// Nodes that are tried, in the order of distance, before a point takes the nearest one with a like normal.
@@ -159,20 +161,53 @@ InsideSight::Eyes eyes_of(PointsIn points, PointsIn normals, double width, const
 
 }  // namespace
 
+void NodeSight::set_nodes(PointsIn nodes, double width) {
+  nearest_node_ = std::make_shared<const SignedDistance>(nearest_samples(nodes));
+  doubtful_.assign(static_cast<std::size_t>(nodes.rows()), false);
+  const double near = doubtful_widths * width;
+  for (Index i = 0; i < nodes.rows(); ++i)
+    doubtful_[i] = std::any_of(
+        others.begin() + starts[i], others.begin() + starts[i + 1],
+        [&](std::int32_t other) { return (nodes.row(i) - nodes.row(other)).squaredNorm() < near * near; });
+}
+
+std::vector<SurfaceSide> NodeSight::nearest_nodes(PointsIn points) const {
+  return nearest_node_->closest(points).triangles;
+}
+
 void NodeSight::set_places(PointsIn places, std::vector<SurfaceSide> sides) {
   places_ = places;
   sides_ = std::move(sides);
-  nearest_ = places_.rows() > 0 ? std::make_shared<const SignedDistance>(nearest_samples(places_)) : nullptr;
+  nearest_place_ =
+      places_.rows() > 0 ? std::make_shared<const SignedDistance>(nearest_samples(places_)) : nullptr;
 }
 
 std::vector<SurfaceSide> NodeSight::sides_near(PointsIn points) const {
-  std::vector<SurfaceSide> result(static_cast<std::size_t>(points.rows()), -1);
-  if (!nearest_ || points.rows() == 0) return result;
-  const ClosestPoints closest = nearest_->closest(points);
-  for (std::size_t i = 0; i < result.size(); ++i)
-    if (closest.distances[static_cast<Index>(i)] < reach)
-      result[i] = sides_[static_cast<std::size_t>(closest.triangles[i])];
+  if (points.rows() == 0) return {};
+  const ClosestPoints nearest = nearest_node_->closest(points);
+  std::vector<SurfaceSide> result = nearest.triangles;
+  std::vector<Index> rows;
+  for (Index i = 0; i < points.rows(); ++i)
+    if (!(nearest.distances[i] < reach))
+      result[i] = -1;
+    else if (nearest_place_ && is_doubtful(result[i]))
+      rows.push_back(i);
+  if (rows.empty()) return result;
+  const std::vector<std::int32_t> places = nearest_place_->closest(points(rows, Eigen::all)).triangles;
+  for (std::size_t k = 0; k < rows.size(); ++k) result[rows[k]] = sides_[places[k]];
   return result;
+}
+
+void NodeSight::keep(std::shared_ptr<const TriangleMesh> mesh, std::vector<SurfaceSide> sides) {
+  mesh_ = std::move(mesh);
+  mesh_sides_ = std::move(sides);
+}
+
+const std::vector<SurfaceSide>* NodeSight::kept(const TriangleMesh& mesh) const {
+  const bool same = mesh_ && mesh_->vertices.rows() == mesh.vertices.rows() &&
+                    mesh_->triangles.rows() == mesh.triangles.rows() && mesh_->vertices == mesh.vertices &&
+                    mesh_->triangles == mesh.triangles;
+  return same ? &mesh_sides_ : nullptr;
 }
 
 void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
@@ -250,15 +285,10 @@ struct SeenNodes {
   Vector distances;          ///< infinity there
 };
 
-SeenNodes nearest_seen(PointsIn points, PointsIn normals, PointsIn nodes, PointsIn node_normals, double width,
-                       const InsideSight& mesh) {
+/// `nearest`: the node nearest to each point.
+SeenNodes nearest_seen(PointsIn points, PointsIn normals, PointsIn nodes, PointsIn node_normals,
+                       const std::vector<std::int32_t>& nearest, double width, const InsideSight& mesh) {
   const Index count = points.rows(), tried = std::min(most_tried, nodes.rows());
-  const Eigen::ArrayX3d columns = nodes;
-  const auto squares_from = [&](Index i, Eigen::ArrayXd& squares) {
-    squares.head(nodes.rows()) = (columns.col(0) - points(i, 0)).square() +
-                                 (columns.col(1) - points(i, 1)).square() +
-                                 (columns.col(2) - points(i, 2)).square();
-  };
   const InsideSight::Eyes from = eyes_of(points, normals, width, mesh),
                           to = eyes_of(nodes, node_normals, width, mesh);
   SeenNodes result{std::vector<Index>(static_cast<std::size_t>(count)),
@@ -278,25 +308,20 @@ SeenNodes nearest_seen(PointsIn points, PointsIn normals, PointsIn nodes, Points
       result.distances[i] = (nodes.row(node) - points.row(i)).norm();
     }
   };
-  std::vector<std::pair<Index, Index>> pairs(static_cast<std::size_t>(count));
-  parallel_for(0, count, 64, [&](Index first, Index last) {
-    Eigen::ArrayXd squares(nodes.rows());
-    for (Index i = first; i < last; ++i) {
-      Index nearest = 0;
-      squares_from(i, squares);
-      squares.minCoeff(&nearest);
-      pairs[i] = {i, nearest};
-    }
-  });
+  std::vector<std::pair<Index, Index>> pairs;
+  for (Index i = 0; i < count; ++i) pairs.emplace_back(i, nearest[static_cast<std::size_t>(i)]);
   look(pairs);
   // Few points do not see their nearest node: these try more, in the order of distance.
   const std::vector<Index> others = left;
+  const Eigen::ArrayX3d columns = nodes;
   std::vector<Index> candidates(others.size() * static_cast<std::size_t>(tried));
   parallel_for(0, std::ssize(others), 16, [&](Index first, Index last) {
     Eigen::ArrayXd squares(nodes.rows());
     std::vector<Index> order(static_cast<std::size_t>(nodes.rows()));
     for (Index k = first; k < last; ++k) {
-      squares_from(others[k], squares);
+      const Index i = others[k];
+      squares = (columns.col(0) - points(i, 0)).square() + (columns.col(1) - points(i, 1)).square() +
+                (columns.col(2) - points(i, 2)).square();
       std::iota(order.begin(), order.end(), Index{0});
       std::partial_sort(order.begin(), order.begin() + tried, order.end(), [&](Index a, Index c) {
         return squares[a] != squares[c] ? squares[a] < squares[c] : a < c;
@@ -335,9 +360,10 @@ std::vector<Index> unseen_samples(PointsIn samples, PointsIn normals, const std:
         break;
       }
   const Points places = samples(near, Eigen::all), directions = normals(near, Eigen::all);
-  Vector distances =
-      nearest_seen(places, directions, samples(chosen, Eigen::all), normals(chosen, Eigen::all), width, mesh)
-          .distances;
+  const Points nodes = samples(chosen, Eigen::all);
+  Vector distances = nearest_seen(places, directions, nodes, normals(chosen, Eigen::all),
+                                  nearest_samples(nodes).closest(places).triangles, width, mesh)
+                         .distances;
   const InsideSight::Eyes eyes = eyes_of(places, directions, width, mesh);
   std::vector<Index> added;
   for (Index farthest = 0; !near.empty() && std::ssize(added) < most_nodes / 2;) {
@@ -359,31 +385,25 @@ std::vector<Index> unseen_samples(PointsIn samples, PointsIn normals, const std:
 }  // namespace
 
 std::vector<SurfaceSide> InteriorEmbedding::sides_of(PointsIn points, PointsIn normals,
-                                                     const InsideSight& mesh) const {
-  std::vector<SurfaceSide> result(static_cast<std::size_t>(points.rows()), -1);
-  if (!sight) return result;
-  std::vector<Index> hiding;  // nodes that do not see all others
-  for (Index i = 0; i < nodes.rows(); ++i)
-    if (sight->starts[i] < sight->starts[i + 1]) hiding.push_back(i);
-  const double near = sight->reach * sight->reach;
-  std::vector<char> matters(result.size());
-  parallel_for(0, points.rows(), 256, [&](Index first, Index last) {
-    for (Index p = first; p < last; ++p)
-      for (std::size_t k = 0; k < hiding.size() && matters[p] == 0; ++k)
-        matters[p] = (nodes.row(hiding[k]) - points.row(p)).squaredNorm() < near;
-  });
+                                                     const InsideSight& mesh,
+                                                     std::vector<Index>* doubtful) const {
+  if (!sight) return std::vector<SurfaceSide>(static_cast<std::size_t>(points.rows()), -1);
+  std::vector<SurfaceSide> result = sight->nearest_nodes(points);
   std::vector<Index> some;
+  std::vector<SurfaceSide> nearest;
   for (Index p = 0; p < points.rows(); ++p)
-    if (matters[p] != 0) some.push_back(p);
+    if (sight->is_doubtful(result[p])) some.push_back(p), nearest.push_back(result[p]);
+  if (doubtful != nullptr) *doubtful = some;
   if (some.empty()) return result;
-  const SeenNodes seen =
-      nearest_seen(points(some, Eigen::all), normals(some, Eigen::all), nodes, sight->normals, width, mesh);
+  const SeenNodes seen = nearest_seen(points(some, Eigen::all), normals(some, Eigen::all), nodes,
+                                      sight->normals, nearest, width, mesh);
   for (std::size_t k = 0; k < some.size(); ++k) result[some[k]] = static_cast<SurfaceSide>(seen.nodes[k]);
   return result;
 }
 
 std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& mesh, const Frame& frame) const {
   if (!sight) return std::vector<SurfaceSide>(static_cast<std::size_t>(mesh.vertices.rows()), -1);
+  if (const std::vector<SurfaceSide>* const known = sight->kept(mesh)) return *known;
   return sides_of(frame.to_cube(mesh.vertices), vertex_normals(mesh), InsideSight(mesh, frame));
 }
 
@@ -510,7 +530,10 @@ std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn
                             may_join || mesh ? nodes_may_join : MayJoin());
   if (embedding.sight) {
     measure(graph, embedding.nodes, hidden, embedding.width, *embedding.sight);
-    if (embedding.sight->others.empty()) embedding.sight = nullptr;
+    if (embedding.sight->others.empty())
+      embedding.sight = nullptr;
+    else
+      embedding.sight->set_nodes(embedding.nodes, embedding.width);
   }
   RowMatrix<double> excess = (detour * graph.distances(count)).array().square();
   for (Index i = 0; i < n; ++i)

@@ -14,8 +14,8 @@
 
 namespace arapfields {
 
-/// The side of the surface that a point lies on, where parts of the shape nearly touch: the nearest node that
-/// it sees through the inside (row of the nodes); −1 where no part is near another.
+/// The side of the surface that a point lies on: the nearest node that it sees through the inside (row of the
+/// nodes). −1: unknown; all nodes are then weighted by their straight distance.
 using SurfaceSide = std::int32_t;
 
 /// What the nodes of an embedding see of each other, where parts of the shape nearly touch through the
@@ -29,17 +29,33 @@ struct ARAPFIELDS_EXPORT NodeSight {
   double reach = 0.0;             ///< distance up to which nodes are listed
   Points normals = Points(0, 3);  ///< (n,3) of the nodes, unit length
 
-  /// Points of the surface whose side is known, for queries that know nothing but their position.
+  /// Prepares queries, once the lists above and the nodes (n,3), with the width of their weights, are known.
+  void set_nodes(PointsIn nodes, double width);
+  /// For each point (n,3) the nearest node. It is the side of most points.
+  std::vector<SurfaceSide> nearest_nodes(PointsIn points) const;
+  /// Whether points that are nearest to a node may lie on the side of another.
+  bool is_doubtful(SurfaceSide node) const { return doubtful_[static_cast<std::size_t>(node)]; }
+
+  /// Points of the surface near doubtful nodes, with their sides, for queries that know nothing but their
+  /// position.
   void set_places(PointsIn places, std::vector<SurfaceSide> sides);
   const Points& places() const { return places_; }
   const std::vector<SurfaceSide>& sides() const { return sides_; }
-  /// The sides (n) of points (n,3): those of the nearest places.
+  /// The sides (n) of points (n,3): those of the nearest places; −1 farther than `reach` from all nodes.
   std::vector<SurfaceSide> sides_near(PointsIn points) const;
+  /// Keeps the sides of the vertices of a mesh, in mesh coordinates, so that they are not found again.
+  void keep(std::shared_ptr<const TriangleMesh> mesh, std::vector<SurfaceSide> sides);
+  /// The kept sides; null unless `mesh` has the vertices and the triangles of the kept one.
+  const std::vector<SurfaceSide>* kept(const TriangleMesh& mesh) const;
 
  private:
+  std::vector<bool> doubtful_;
+  std::shared_ptr<const SignedDistance> nearest_node_;
   Points places_ = Points(0, 3);
   std::vector<SurfaceSide> sides_;
-  std::shared_ptr<const SignedDistance> nearest_;
+  std::shared_ptr<const SignedDistance> nearest_place_;
+  std::shared_ptr<const TriangleMesh> mesh_;
+  std::vector<SurfaceSide> mesh_sides_;
 };
 
 /// An embedding ψ that separates parts which are near in space but far apart inside the shape:
@@ -57,8 +73,10 @@ struct ARAPFIELDS_EXPORT InteriorEmbedding {
 
   /// Jets of ψ at points (n,3), of any order, each on its side (n); null: on that of the nearest known place.
   void evaluate(PointsIn points, JetView<double> out, const std::vector<SurfaceSide>* sides = nullptr) const;
-  /// The sides (n) of points (n,3) of a surface with outward unit normals (n,3).
-  std::vector<SurfaceSide> sides_of(PointsIn points, PointsIn normals, const InsideSight& mesh) const;
+  /// The sides (n) of points (n,3) of a surface with outward unit normals (n,3). `doubtful`: is given the
+  /// rows of the points near doubtful nodes.
+  std::vector<SurfaceSide> sides_of(PointsIn points, PointsIn normals, const InsideSight& mesh,
+                                    std::vector<Index>* doubtful = nullptr) const;
   /// The same of a mesh's vertices, in mesh coordinates; `frame` is that of the nodes' cube.
   std::vector<SurfaceSide> sides_of(const TriangleMesh& mesh, const Frame& frame) const;
 };

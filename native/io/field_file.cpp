@@ -245,6 +245,7 @@ std::shared_ptr<RadialField> read_radial(ArchiveReader& file, const JsonObject& 
       restored.sight = read_sight(
           file, JsonObject(embedding.at("sight"), embedding.name("sight"), {"pairs", "places", "reach"}),
           prefix + "embedding.sight.", nodes);
+    if (restored.sight) restored.sight->set_nodes(restored.nodes, restored.width);
     basis.set_embedding(std::make_shared<const InteriorEmbedding>(std::move(restored)));
   }
   std::shared_ptr<const Influence> influence;

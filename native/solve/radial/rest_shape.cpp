@@ -62,12 +62,11 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
     Points places(count + vertices, 3), directions(count + vertices, 3);
     places << samples.points, samples.frame.to_cube(samples.mesh->vertices);
     directions << samples.normals, vertex_normals(*samples.mesh);
-    const std::vector<SurfaceSide> sides = made->sides_of(places, directions, *sight);
     std::vector<Index> near;
+    const std::vector<SurfaceSide> sides = made->sides_of(places, directions, *sight, &near);
+    made->sight->keep(samples.mesh, {sides.begin() + count, sides.end()});
     std::vector<SurfaceSide> near_sides;
-    for (Index i = 0; i < places.rows(); ++i)
-      if (const SurfaceSide side = sides[static_cast<std::size_t>(i)]; side >= 0)
-        near.push_back(i), near_sides.push_back(side);
+    for (const Index i : near) near_sides.push_back(sides[static_cast<std::size_t>(i)]);
     made->sight->set_places(rows_of(places, near), std::move(near_sides));
   }
   embedding = made;
