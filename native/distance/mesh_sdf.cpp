@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 
 #include "core/parallel.h"
+#include "mesh/outward_triangles.h"
 #include "mesh/sample_mesh.h"
 
 namespace arapfields {
@@ -28,9 +29,9 @@ Points unit_normals(PointsIn vertices, TrianglesIn triangles) {
 MeshSdf::MeshSdf(PointsIn vertices, TrianglesIn triangles, const Progress& progress)
     : frame_(mesh_frame(vertices, triangles)),
       vertices_(vertices),
-      triangles_(triangles),
-      distance_(vertices, triangles, progress),
-      normals_(unit_normals(frame_.to_cube(vertices), triangles)) {}
+      triangles_(outward_triangles({vertices, triangles})),
+      distance_(vertices_, triangles_, progress),
+      normals_(unit_normals(frame_.to_cube(vertices_), triangles_)) {}
 
 Vector MeshSdf::evaluate(PointsIn points, Points* gradients, const Progress& progress) const {
   Vector distances(points.rows());

@@ -12,10 +12,11 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "distance/hierarchy.h"
-#include "distance/is_closed.h"
 #include "distance/kernels.h"
 #include "distance/morton.h"
 #include "distance/triangle_packet.h"
+#include "mesh/is_closed.h"
+#include "mesh/outward_triangles.h"
 #include "mesh/triangle_mesh.h"
 
 namespace arapfields {
@@ -265,7 +266,8 @@ Vector signed_distance(PointsIn vertices, TrianglesIn triangles, PointsIn points
                        const Progress& progress) {
   const ThreadScope scope(threads);
   Vector distances(points.rows());
-  SignedDistance(vertices, triangles, progress).evaluate(points, distances, progress);
+  SignedDistance(vertices, outward_triangles({vertices, triangles}), progress)
+      .evaluate(points, distances, progress);
   return distances;
 }
 

@@ -5,7 +5,7 @@
 #include <map>
 
 #include "core/unit_rows.h"
-#include "distance/is_closed.h"
+#include "mesh/is_closed.h"
 
 namespace arapfields {
 

@@ -9,7 +9,7 @@
 
 #include "core/errors.h"
 #include "distance/hierarchy.h"
-#include "distance/is_closed.h"
+#include "mesh/is_closed.h"
 #include "energies/gauss.h"
 #include "energies/ranges.h"
 #include "mesh/triangle_mesh.h"

@@ -13,6 +13,7 @@
 #include "core/parallel.h"
 #include "fields/interior_embedding_kernel.h"
 #include "fields/radial_basis.h"
+#include "mesh/outward_triangles.h"
 #include "sampling/nearest_sample.h"
 
 namespace arapfields {
@@ -403,8 +404,9 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(PointsIn points, PointsIn n
 
 std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& mesh, const Frame& frame) const {
   if (!sight) return std::vector<SurfaceSide>(static_cast<std::size_t>(mesh.vertices.rows()), -1);
-  if (const std::vector<SurfaceSide>* const known = sight->kept(mesh)) return *known;
-  return sides_of(frame.to_cube(mesh.vertices), vertex_normals(mesh), InsideSight(mesh, frame));
+  const TriangleMesh outward = facing_outwards(mesh);
+  if (const std::vector<SurfaceSide>* const known = sight->kept(outward)) return *known;
+  return sides_of(frame.to_cube(outward.vertices), vertex_normals(outward), InsideSight(outward, frame));
 }
 
 namespace {

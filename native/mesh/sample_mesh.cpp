@@ -12,6 +12,7 @@
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "core/point_grid.h"
+#include "mesh/outward_triangles.h"
 
 namespace arapfields {
 namespace {
@@ -210,7 +211,8 @@ SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count
                            const VertexWeights& painted) {
   require_weights("weights", painted.weights, vertices.rows());
   require_weights("bend_weights", painted.bend_weights, vertices.rows());
-  return draw_from({{vertices, triangles}, painted, area_frame(vertices, triangles), {}}, count, seed, true);
+  const Frame frame = area_frame(vertices, triangles);
+  return draw_from({facing_outwards({vertices, triangles}), painted, frame, {}}, count, seed, true);
 }
 
 SurfaceSamples sample_meshes(const std::vector<TriangleMesh>& meshes, Index count, std::uint64_t seed,
@@ -245,7 +247,8 @@ SurfaceSamples sample_meshes(const std::vector<TriangleMesh>& meshes, Index coun
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     const TriangleMesh& mesh = meshes[i];
     all.mesh.vertices.middleRows(v, mesh.vertices.rows()) = mesh.vertices;
-    all.mesh.triangles.middleRows(t, mesh.triangles.rows()) = mesh.triangles.array() + static_cast<int>(v);
+    all.mesh.triangles.middleRows(t, mesh.triangles.rows()) =
+        outward_triangles(mesh).array() + static_cast<int>(v);
     if (!painted.empty()) {
       if (painted[i].weights.size() > 0)
         all.painted.weights.segment(v, mesh.vertices.rows()) = painted[i].weights;

@@ -9,6 +9,7 @@
 #include "core/random.h"
 #include "core/stopwatch.h"
 #include "distance/training_points.h"
+#include "mesh/outward_triangles.h"
 #include "mesh/sample_mesh.h"
 #include "neural/mlp.h"
 #include "neural/parameters.h"
@@ -128,8 +129,7 @@ FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& op
   require_memory("near_points", example_bytes * options.points.near_points);
   require_memory("uniform_points", example_bytes * options.points.uniform_points);
   const ThreadScope scope(options.machine.threads);
-  const TriangleMesh mesh{vertices, triangles};
-  validate(mesh);
+  const TriangleMesh mesh = facing_outwards({vertices, triangles});
   const Frame frame = mesh_frame(vertices, triangles);
   FitReport report;
   report.device = resolve_device(options.machine.device);
@@ -137,7 +137,7 @@ FitResult fit_sdf(PointsIn vertices, TrianglesIn triangles, const FitOptions& op
   Mlp mlp({options.network, 1}, options.training.seed, false, false, report.device);
 
   progress.report(0.0, "exact distances");
-  const SignedDistance distance(vertices, triangles);
+  const SignedDistance distance(vertices, mesh.triangles);
   const auto seed = static_cast<std::uint64_t>(options.training.seed);
   TrainingPointsOptions where = options.points;
   const Examples examples(training_points(distance, mesh, frame, where, seed, progress.part(0.0, 0.08)),

@@ -7,6 +7,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "distance/welded_vertices.h"
+#include "mesh/outward_triangles.h"
 #include "skin/corrective_fit.h"
 
 namespace arapfields {
@@ -94,11 +95,12 @@ double Corrective::value(const Mat3& rotation) const {
   return std::clamp(value, -1.0, 1.0);
 }
 
-std::vector<Corrective> skin_correctives(const TriangleMesh& mesh, const std::vector<Bone>& bones,
+std::vector<Corrective> skin_correctives(const TriangleMesh& given, const std::vector<Bone>& bones,
                                          const RowMatrix<float>& weights, const SkinOptions& options,
                                          const Progress& progress, const VertexWeights& painted) {
   options.validate();
   const ThreadScope threads(options.threads);
+  const TriangleMesh mesh = facing_outwards(given);
   require(weights.rows() == mesh.vertices.rows() && weights.cols() == static_cast<Index>(bones.size()),
           "weights", std::to_string(weights.rows()) + " by " + std::to_string(weights.cols()),
           "a row for each vertex and a column for each bone are needed");

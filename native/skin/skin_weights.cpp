@@ -7,6 +7,7 @@
 
 #include "core/parallel.h"
 #include "distance/welded_vertices.h"
+#include "mesh/outward_triangles.h"
 #include "skin/example_poses.h"
 #include "skin/limb_sides.h"
 #include "skin/vertex_blend.h"
@@ -151,11 +152,12 @@ RowMatrix<float> skin_weights(const SurfaceSamples& samples, const std::vector<B
                   options.influences);
 }
 
-RowMatrix<float> skin_weights(const TriangleMesh& mesh, const std::vector<Bone>& bones,
+RowMatrix<float> skin_weights(const TriangleMesh& given, const std::vector<Bone>& bones,
                               const SkinOptions& options, const Progress& progress,
                               const VertexWeights& painted) {
   options.validate();
   const ThreadScope threads(options.threads);
+  const TriangleMesh mesh = facing_outwards(given);
   const WeldedVertices welded(mesh);
   const RigShape rig = rig_shape(mesh, welded, painted, bones, options, progress);
   RowMatrix<float> fitted =

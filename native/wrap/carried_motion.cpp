@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/parallel.h"
-#include "distance/is_closed.h"
+#include "mesh/is_closed.h"
 
 namespace arapfields {
 namespace {

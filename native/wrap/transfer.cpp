@@ -10,9 +10,10 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "distance/is_closed.h"
 #include "distance/signed_distance.h"
 #include "distance/welded_vertices.h"
+#include "mesh/is_closed.h"
+#include "mesh/outward_triangles.h"
 #include "sampling/oriented_points.h"
 #include "wrap/carried_motion.h"
 
@@ -163,8 +164,9 @@ WrappedMesh::WrappedMesh(const TriangleMesh& source, const DeformationField& fie
     : WrappedMesh(source, moved_by(field, source)) {}
 
 WrappedMesh::WrappedMesh(const TriangleMesh& source, PointsIn positions)
-    : rest(source), moved{positions, source.triangles}, jacobians(positions.rows(), Mat3::Zero()) {
-  validate(source);
+    : rest(facing_outwards(source)),
+      moved{positions, rest.triangles},
+      jacobians(positions.rows(), Mat3::Zero()) {
   require(positions.rows() == source.vertices.rows(), "field",
           std::to_string(positions.rows()) + " moved vertices", "one for each of the source is needed");
   validate(moved);
@@ -175,14 +177,14 @@ WrappedMesh::WrappedMesh(const TriangleMesh& source, PointsIn positions)
     columns << edges.first, edges.second, edges.area / std::sqrt(edges.area.norm());
     return columns;
   };
-  for (Index t = 0; t < source.triangles.rows(); ++t) {
-    const TriangleEdges before(source.vertices, source.triangles, t), now(positions, source.triangles, t);
+  for (Index t = 0; t < rest.triangles.rows(); ++t) {
+    const TriangleEdges before(rest.vertices, rest.triangles, t), now(positions, rest.triangles, t);
     const double area = before.area.norm();
     if (!(area > 0.0 && now.area.norm() > 0.0)) continue;
     const Mat3 gradient = basis(now) * basis(before).inverse();
     if (!gradient.allFinite()) continue;
     for (int k = 0; k < 3; ++k) {
-      const std::int32_t v = first[source.triangles(t, k)];
+      const std::int32_t v = first[rest.triangles(t, k)];
       jacobians[v] += area * gradient;
       areas[v] += area;
     }
@@ -205,10 +207,10 @@ struct Correspondence::Motion {
   std::optional<CarriedMotion> carried;
 };
 
-Correspondence::Correspondence(const WrappedMesh& source, const TriangleMesh& target, Direction direction,
-                               const Progress& progress)
+Correspondence::Correspondence(const WrappedMesh& source, const TriangleMesh& given_target,
+                               Direction direction, const Progress& progress)
     : motion_(std::make_shared<Motion>(source, direction == Direction::to_source)) {
-  validate(target);
+  const TriangleMesh target = facing_outwards(given_target);
   const bool forward = direction == Direction::to_target;
   giving_ = forward ? source.rest : target;
   receiving_ = forward ? target : source.rest;

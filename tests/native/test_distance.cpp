@@ -6,7 +6,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "distance/hierarchy.h"
-#include "distance/is_closed.h"
+#include "mesh/is_closed.h"
 #include "distance/kernels.h"
 #include "distance/signed_distance.h"
 #include "distance/training_points.h"

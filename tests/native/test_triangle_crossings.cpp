@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/parallel.h"
-#include "distance/is_closed.h"
+#include "mesh/is_closed.h"
 #include "distance/triangle_crossings.h"
 #include "shapes.h"
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/unit_rows.h"
-#include "distance/is_closed.h"
+#include "mesh/is_closed.h"
 #include "distance/triangle_crossings.h"
 #include "sampling/sample_choice.h"
 

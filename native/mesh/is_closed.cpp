@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "distance/is_closed.h"
+#include "mesh/is_closed.h"
 
 #include <algorithm>
 #include <array>

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "mesh/triangle_mesh.h"
+
+namespace arapfields {
+
+/// The triangles (m,3) of a mesh with their corners in the order that faces outwards; rows stay. Across
+/// an edge of two triangles both face the same side, as the larger area of their patch does; a closed patch
+/// then encloses a positive volume. One inside another closed patch, such as the wall of a cavity or an
+/// eyeball, is turned as that one is. A patch with small holes counts as closed; one that is open, such as a
+/// sheet, faces where most of it faced. Vertices at one position count as one.
+Triangles outward_triangles(const TriangleMesh& mesh);
+/// The mesh with these triangles. Both throw InvalidInput as validate() does.
+TriangleMesh facing_outwards(const TriangleMesh& mesh);
+
+}  // namespace arapfields
