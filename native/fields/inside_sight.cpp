@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fields/inside_sight.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "distance/welded_vertices.h"
 
@@ -13,11 +15,22 @@ namespace {
 /// it comes from, nor another one in the same place.
 constexpr double below_own_face = 1e-7;
 
+/// Points on one sheet see each other around its bends if they are nearer than so many of their depths, their
+/// normals are alike (least cosine), and the ways to the place between them are free, halved so often.
+constexpr double near_depths = 20.0, one_sheet_cosine = 0.3;
+constexpr int most_bends = 2;
+
 }  // namespace
 
 InsideSight::InsideSight(const TriangleMesh& mesh, const Frame& frame, const Progress& progress)
     : distance_(frame.to_cube(mesh.vertices), mesh.triangles, progress),
       size_(diagonal_of(mesh.vertices) / frame.scale) {
+  triangle_normals_.resize(mesh.triangles.rows(), 3);
+  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return Vec3(mesh.vertices.row(mesh.triangles(t, k))); };
+    triangle_normals_.row(t) =
+        (corner(1) - corner(0)).cross(corner(2) - corner(0)).stableNormalized().transpose();
+  }
   const std::vector<Index> pieces = WeldedVertices(mesh).pieces(mesh);
   for (Index t = 0; t < mesh.triangles.rows(); ++t)
     piece_of_triangle_.push_back(static_cast<std::int32_t>(pieces[mesh.triangles(t, 0)]));
@@ -26,7 +39,7 @@ InsideSight::InsideSight(const TriangleMesh& mesh, const Frame& frame, const Pro
 }
 
 InsideSight::Eyes InsideSight::below(PointsIn points, PointsIn normals, const Vector& depths) const {
-  Eyes result{points, {}};
+  Eyes result{points, normals, depths, {}};
   if (is_one_piece_)
     result.pieces.assign(static_cast<std::size_t>(points.rows()), piece_of_triangle_.front());
   else
@@ -43,8 +56,46 @@ InsideSight::Eyes InsideSight::below(PointsIn points, PointsIn normals, const Ve
   return result;
 }
 
-std::vector<bool> InsideSight::see(const Eyes& from, const Eyes& to,
-                                   const std::vector<std::pair<Index, Index>>& pairs) const {
+std::vector<bool> InsideSight::see(const Eyes& from, const Eyes& to, const Pairs& pairs) const {
+  return see(from, to, pairs, most_bends);
+}
+
+std::vector<bool> InsideSight::see(const Eyes& from, const Eyes& to, const Pairs& pairs, int bends) const {
+  std::vector<bool> result = see_straight(from, to, pairs);
+  std::vector<std::size_t> bent;
+  for (std::size_t k = 0; k < pairs.size() && bends > 0; ++k) {
+    const auto& [i, j] = pairs[k];
+    const double near = near_depths * std::max(from.depths[i], to.depths[j]);
+    if (!result[k] && from.normals.row(i).dot(to.normals.row(j)) > one_sheet_cosine &&
+        (from.places.row(i) - to.places.row(j)).squaredNorm() < near * near)
+      bent.push_back(k);
+  }
+  if (bent.empty()) return result;
+  const auto count = static_cast<Index>(bent.size());
+  Points middle(count, 3), normals(count, 3);
+  Vector depths(count);
+  for (Index k = 0; k < count; ++k) {
+    const auto& [i, j] = pairs[bent[static_cast<std::size_t>(k)]];
+    middle.row(k) = 0.5 * (from.places.row(i) + to.places.row(j));
+    depths[k] = from.depths[i];
+  }
+  const ClosestPoints closest = distance_.closest(middle);
+  for (Index k = 0; k < count; ++k)
+    normals.row(k) = triangle_normals_.row(closest.triangles[static_cast<std::size_t>(k)]);
+  const Eyes between = below(closest.points, normals, depths);
+  Pairs first, second;
+  for (Index k = 0; k < count; ++k) {
+    const auto& [i, j] = pairs[bent[static_cast<std::size_t>(k)]];
+    first.emplace_back(i, k);
+    second.emplace_back(k, j);
+  }
+  const std::vector<bool> before = see(from, between, first, bends - 1),
+                          after = see(between, to, second, bends - 1);
+  for (std::size_t k = 0; k < bent.size(); ++k) result[bent[k]] = before[k] && after[k];
+  return result;
+}
+
+std::vector<bool> InsideSight::see_straight(const Eyes& from, const Eyes& to, const Pairs& pairs) const {
   const auto count = static_cast<Index>(pairs.size());
   Points begin(count, 3), end(count, 3);
   std::vector<std::int32_t> pieces(pairs.size());

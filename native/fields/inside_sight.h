@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/frame.h"
@@ -13,8 +14,9 @@
 namespace arapfields {
 
 /// Tells which points of a mesh see each other through the inside of the shape: the straight segment between
-/// them, a little below the surface at both ends, meets no triangle of their own connected piece. Two faces
-/// in one place, each with its own vertices, hide each other.
+/// them, a little below the surface at both ends, meets no triangle of their own connected piece. Points near
+/// each other on one thin and curved sheet, whose segment leaves the shape, see each other by way of places
+/// of the sheet between them. Two faces in one place, each with its own vertices, hide each other.
 class ARAPFIELDS_EXPORT_TO_TESTS InsideSight {
  public:
   /// A valid mesh in mesh coordinates, and the frame of the cube in which all points are. Throws Cancelled.
@@ -23,6 +25,8 @@ class ARAPFIELDS_EXPORT_TO_TESTS InsideSight {
   /// Points just below the surface.
   struct Eyes {
     Points places;                     ///< (n,3)
+    Points normals;                    ///< (n,3) of the surface above them
+    Vector depths;                     ///< (n) below it, where the shape is thick enough
     std::vector<std::int32_t> pieces;  ///< (n) the connected piece of the mesh that each lies on
   };
   /// Points (n,3) of the surface with outward unit normals (n,3), moved inwards by `depths` (n), or by half
@@ -33,7 +37,12 @@ class ARAPFIELDS_EXPORT_TO_TESTS InsideSight {
                         const std::vector<std::pair<Index, Index>>& pairs) const;
 
  private:
+  using Pairs = std::vector<std::pair<Index, Index>>;
+  std::vector<bool> see_straight(const Eyes& from, const Eyes& to, const Pairs& pairs) const;
+  std::vector<bool> see(const Eyes& from, const Eyes& to, const Pairs& pairs, int bends) const;
+
   SignedDistance distance_;
+  Points triangle_normals_;
   std::vector<std::int32_t> piece_of_triangle_;
   bool is_one_piece_ = true;
   double size_ = 1.0;  // of the mesh in the cube

@@ -39,6 +39,13 @@ constexpr double facing_widths = 2.0, facing_cosine = -0.3, facing_behind = 1e-3
 constexpr double sight_widths = 4.0;
 /// Distance, in widths, of a hidden node up to which it may be the nearest one to a point of the other side.
 constexpr double doubtful_widths = 2.5;
+/// A node that is not seen lies around a bend of the surface, and counts as one that is seen, up to the first
+/// ratio of interior to straight distances, and beyond a gap from the second one: the nodes' zigzag alone
+/// makes paths a quarter longer.
+constexpr double bend_ratio = 1.3, gap_ratio = 2.0;
+/// The excess at a point is blended from nodes near by, up to this distance from its side's, in widths, with
+/// Gaussian weights of this width, so that it changes smoothly from side to side.
+constexpr double company_widths = 2.2, blend_widths = 0.8;
 /// Longest interior distance that is looked for, in widths: nodes beyond it have no weight.
 constexpr double longest_widths = 6.0;
 /// Depth of eyes below the surface, in widths.
@@ -170,6 +177,16 @@ void NodeSight::set_nodes(PointsIn nodes, double width) {
     doubtful_[i] = std::any_of(
         others.begin() + starts[i], others.begin() + starts[i + 1],
         [&](std::int32_t other) { return (nodes.row(i) - nodes.row(other)).squaredNorm() < near * near; });
+  const double together = company_widths * width;
+  company_.assign(static_cast<std::size_t>(nodes.rows()), {});
+  parallel_for(0, nodes.rows(), 32, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i)
+      for (Index j = 0; j < nodes.rows(); ++j)
+        if ((nodes.row(i) - nodes.row(j)).squaredNorm() < together * together &&
+            !std::binary_search(others.begin() + starts[i], others.begin() + starts[i + 1],
+                                static_cast<std::int32_t>(j)))
+          company_[i].push_back(static_cast<std::int32_t>(j));
+  });
 }
 
 std::vector<SurfaceSide> NodeSight::nearest_nodes(PointsIn points) const {
@@ -225,7 +242,7 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
     std::array<double, 3 * block> packed;
     std::array<double, 30 * block> jets;
     std::vector<std::int32_t> near(n);
-    std::vector<double> distance(n), excess;
+    std::vector<double> distance(n), excess, shares;
     std::vector<Index> slots(sight ? n : 0, -1);  // of the nodes among those that are near
     for (Index b = first; b < last; ++b) {
       const Index valid = std::min(block, count - b * block);
@@ -248,7 +265,8 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
       };
       for (Index i = 0; sight && i < valid; ++i)
         if (const SurfaceSide side = side_of(i); side >= 0) {
-          hides = hides || sight->starts[side] < sight->starts[side + 1];
+          for (const std::int32_t node : sight->company(side))
+            hides = hides || sight->starts[node] < sight->starts[node + 1];
           farthest_nearest = std::max(farthest_nearest, (part.row(i) - nodes.row(side)).norm());
         }
       const double cutoff =
@@ -262,9 +280,20 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
         for (Index i = 0; i < block; ++i) {
           const SurfaceSide side = side_of(i);
           if (side < 0) continue;
-          for (std::int32_t k = sight->starts[side]; k < sight->starts[side + 1]; ++k)
-            if (const Index slot = slots[sight->others[k]]; slot >= 0)
-              excess[slot * block + i] = sight->excess[k];
+          const auto place = part.row(std::min(i, valid - 1));
+          const std::vector<std::int32_t>& company = sight->company(side);
+          shares.clear();
+          double sum = 0.0;
+          for (const std::int32_t node : company) {
+            const double share =
+                std::exp(-(place - nodes.row(node)).squaredNorm() * scale / (blend_widths * blend_widths));
+            shares.push_back(share);
+            sum += share;
+          }
+          for (std::size_t m = 0; m < company.size(); ++m)
+            for (std::int32_t k = sight->starts[company[m]]; k < sight->starts[company[m] + 1]; ++k)
+              if (const Index slot = slots[sight->others[k]]; slot >= 0)
+                excess[slot * block + i] += shares[m] / sum * sight->excess[k];
         }
         for (Index a = 0; a < near_count; ++a) slots[near[a]] = -1;
       }
@@ -432,13 +461,14 @@ std::vector<bool> near_other_parts(const Points& nodes, const Points& normals, P
   return result;
 }
 
-/// Pairs of nodes, near each other, that do not see each other: a list for each node.
-Neighbours hidden_pairs(const Points& nodes, const Points& normals, double width, const InsideSight& mesh) {
+/// Pairs of marked nodes, near each other, that do not see each other: a list for each node.
+Neighbours hidden_pairs(const Points& nodes, const Points& normals, const std::vector<bool>& marked,
+                        double width, const InsideSight& mesh) {
   const double reach = sight_widths * width;
   std::vector<std::pair<Index, Index>> pairs;
   for (Index i = 0; i < nodes.rows(); ++i)
-    for (Index j = i + 1; j < nodes.rows(); ++j)
-      if ((nodes.row(i) - nodes.row(j)).squaredNorm() < reach * reach) pairs.emplace_back(i, j);
+    for (Index j = i + 1; marked[i] && j < nodes.rows(); ++j)
+      if (marked[j] && (nodes.row(i) - nodes.row(j)).squaredNorm() < reach * reach) pairs.emplace_back(i, j);
   const InsideSight::Eyes eyes = eyes_of(nodes, normals, width, mesh);
   const std::vector<bool> seen = mesh.see(eyes, eyes, pairs);
   Neighbours hidden(static_cast<std::size_t>(nodes.rows()));
@@ -462,7 +492,9 @@ void measure(const InteriorGraph& graph, const Points& nodes, const Neighbours& 
       const std::vector<float> lengths = graph.distances_from(std::move(start), longest);
       for (const Index j : hidden[i]) {
         const double inside = detour * std::min(lengths[j], longest);
-        excess[i].push_back(std::max(0.0, inside * inside - (nodes.row(i) - nodes.row(j)).squaredNorm()));
+        const double square = (nodes.row(i) - nodes.row(j)).squaredNorm();
+        const double beyond = (inside / std::sqrt(square) - bend_ratio) / (gap_ratio - bend_ratio);
+        excess[i].push_back(std::clamp(beyond, 0.0, 1.0) * std::max(0.0, inside * inside - square));
       }
     }
   });
@@ -491,8 +523,10 @@ std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn
   // Where parts of the shape nearly touch, no edge of the graph crosses the surface.
   std::vector<Index> rows = chosen.indices;
   std::shared_ptr<const InsideSight> mesh;
+  Points others(0, 3), other_normals(0, 3);
   if (make_sight) {
-    Points others = samples, other_normals = normals;
+    others = samples;
+    other_normals = normals;
     if (axis >= 0) {
       others.conservativeResize(2 * samples.rows(), 3);
       other_normals.conservativeResize(2 * samples.rows(), 3);
@@ -522,7 +556,10 @@ std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn
     embedding.sight = std::make_shared<NodeSight>();
     embedding.sight->reach = sight_widths * embedding.width;
     embedding.sight->normals = node_normals;
-    hidden = hidden_pairs(embedding.nodes, node_normals, embedding.width, *mesh);
+    hidden =
+        hidden_pairs(embedding.nodes, node_normals,
+                     near_other_parts(embedding.nodes, node_normals, others, other_normals, embedding.width),
+                     embedding.width, *mesh);
   }
   const MayJoin nodes_may_join = [&](Index i, Index j) {
     return (!may_join || rows_may_join(i, j)) &&

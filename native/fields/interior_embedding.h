@@ -33,6 +33,11 @@ struct ARAPFIELDS_EXPORT NodeSight {
   void set_nodes(PointsIn nodes, double width);
   /// For each point (n,3) the nearest node. It is the side of most points.
   std::vector<SurfaceSide> nearest_nodes(PointsIn points) const;
+  /// The nodes from which the excess at points on the side of a node is blended: that node and those that it
+  /// sees near by.
+  const std::vector<std::int32_t>& company(SurfaceSide node) const {
+    return company_[static_cast<std::size_t>(node)];
+  }
   /// Whether points that are nearest to a node may lie on the side of another.
   bool is_doubtful(SurfaceSide node) const { return doubtful_[static_cast<std::size_t>(node)]; }
 
@@ -50,6 +55,7 @@ struct ARAPFIELDS_EXPORT NodeSight {
 
  private:
   std::vector<bool> doubtful_;
+  std::vector<std::vector<std::int32_t>> company_;
   std::shared_ptr<const SignedDistance> nearest_node_;
   Points places_ = Points(0, 3);
   std::vector<SurfaceSide> sides_;

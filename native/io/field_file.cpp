@@ -207,6 +207,10 @@ std::shared_ptr<NodeSight> read_sight(ArchiveReader& file, const JsonObject& obj
                                       const std::string& prefix, Index nodes) {
   const Index pairs = object.integer("pairs", 0, INT32_MAX - 1),
               places = object.integer("places", 0, most_rows);
+  // The library makes at most 2,250; what nodes see of each other is looked at pair by pair.
+  constexpr Index most_nodes = 20'000;
+  require(nodes <= most_nodes, prefix + "starts", "there are " + std::to_string(nodes) + " nodes",
+          "at most " + std::to_string(most_nodes) + " can have lists of what they see");
   auto sight = std::make_shared<NodeSight>();
   sight->reach = object.number("reach");
   require_positive(object.name("reach"), sight->reach);

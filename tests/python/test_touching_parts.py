@@ -6,8 +6,8 @@ import functools
 import numpy as np
 import pytest
 from support.files import archives
-from support.geometry import slit
-from support.geometry.meshes import check_closed
+from support.geometry import cases, slit
+from support.geometry.meshes import check_closed, read
 
 import arapfields as af
 
@@ -44,6 +44,33 @@ def test_the_jaws_of_a_slit_bar_come_apart(gap):
 def test_a_closed_slit_costs_what_an_open_one_does():
     energies = [solved(gap)[3].report.energy for gap in GAPS]
     assert max(energies[1:]) < 4.0 * energies[0]
+
+
+# Neighbouring vertices of a bent animal; its field alone, without sides, stretches its edges by at most 1.17.
+LONGEST_EDGE = 1.3
+
+
+@pytest.mark.parametrize("name", ["spot.obj", "bunny.off", "rockerArm.obj"])
+def test_folds_and_limbs_of_ordinary_shapes_are_not_torn(name, data_dir):
+    vertices, triangles = read(data_dir / "meshes" / name)[:2]
+    centered = vertices - vertices.mean(axis=0)
+    axes = np.linalg.eigh(centered.T @ centered)[1][:, ::-1].copy()
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    vertices = centered @ axes
+    vertices /= np.ptp(vertices[:, 0]) / 2.0
+    low, high = vertices.min(axis=0) - 0.05, vertices.max(axis=0) + 0.05
+    first, last = np.quantile(vertices[:, 0], [0.1, 0.9])
+    handles = [
+        cases.moved(cases.box(low, (first, *high[1:]))),
+        cases.moved(cases.box((last, *low[1:]), high), cases.turn((0, 0, 1), 50.0)),
+    ]
+    field = af.deform(af.sample_mesh(vertices, triangles), handles)
+    deformed = field.apply(vertices, triangles=triangles)
+
+    def edges(places):
+        return np.linalg.norm(places[triangles] - places[np.roll(triangles, 1, axis=1)], axis=2)
+
+    assert np.max(edges(deformed) / edges(vertices)) < LONGEST_EDGE
 
 
 def test_vertices_without_triangles_take_the_nearest_side():
