@@ -48,6 +48,8 @@ constexpr double bend_ratio = 1.3, gap_ratio = 2.0;
 constexpr double company_widths = 2.2, blend_widths = 0.8;
 /// Longest interior distance that is looked for, in widths: nodes beyond it have no weight.
 constexpr double longest_widths = 6.0;
+/// Rounds over a mesh's edges in which their ends come to lie on sides that see each other.
+constexpr int most_rounds = 4;
 /// Depth of eyes below the surface, in widths.
 constexpr double eye_widths = 0.15;
 /// Nodes that are tried, in the order of distance, before a point takes the nearest one with a like normal.
@@ -183,8 +185,7 @@ void NodeSight::set_nodes(PointsIn nodes, double width) {
     for (Index i = first; i < last; ++i)
       for (Index j = 0; j < nodes.rows(); ++j)
         if ((nodes.row(i) - nodes.row(j)).squaredNorm() < together * together &&
-            !std::binary_search(others.begin() + starts[i], others.begin() + starts[i + 1],
-                                static_cast<std::int32_t>(j)))
+            !hides(static_cast<SurfaceSide>(i), static_cast<SurfaceSide>(j)))
           company_[i].push_back(static_cast<std::int32_t>(j));
   });
 }
@@ -214,6 +215,10 @@ std::vector<SurfaceSide> NodeSight::sides_near(PointsIn points) const {
   const std::vector<std::int32_t> places = nearest_place_->closest(points(rows, Eigen::all)).triangles;
   for (std::size_t k = 0; k < rows.size(); ++k) result[rows[k]] = sides_[places[k]];
   return result;
+}
+
+bool NodeSight::hides(SurfaceSide node, SurfaceSide other) const {
+  return std::binary_search(others.begin() + starts[node], others.begin() + starts[node + 1], other);
 }
 
 void NodeSight::keep(std::shared_ptr<const TriangleMesh> mesh, std::vector<SurfaceSide> sides) {
@@ -435,7 +440,40 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& mesh, c
   if (!sight) return std::vector<SurfaceSide>(static_cast<std::size_t>(mesh.vertices.rows()), -1);
   const TriangleMesh outward = facing_outwards(mesh);
   if (const std::vector<SurfaceSide>* const known = sight->kept(outward)) return *known;
-  return sides_of(frame.to_cube(outward.vertices), vertex_normals(outward), InsideSight(outward, frame));
+  return sides_of(outward, frame, InsideSight(outward, frame));
+}
+
+std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& outward, const Frame& frame,
+                                                     const InsideSight& mesh,
+                                                     std::vector<Index>* doubtful) const {
+  const Points places = frame.to_cube(outward.vertices);
+  std::vector<Index> near;
+  std::vector<SurfaceSide> result = sides_of(places, vertex_normals(outward), mesh, &near);
+  if (doubtful != nullptr) *doubtful = near;
+  std::vector<bool> is_near(result.size(), false);
+  for (const Index v : near) is_near[static_cast<std::size_t>(v)] = true;
+  const auto distance = [&](std::int32_t v, SurfaceSide side) {
+    return (places.row(v) - nodes.row(side)).squaredNorm();
+  };
+  // Each change takes a vertex to a side of a neighbour that is nearer than its own was to the other: few are
+  // left after a few rounds.
+  bool changed = !near.empty();
+  for (int round = 0; changed && round < most_rounds; ++round) {
+    changed = false;
+    for (Index t = 0; t < outward.triangles.rows(); ++t)
+      for (int k = 0; k < 3; ++k) {
+        const std::int32_t a = outward.triangles(t, k), b = outward.triangles(t, (k + 1) % 3);
+        if (!is_near[a] || !is_near[b] || result[a] == result[b] || !sight->hides(result[a], result[b]) ||
+            (places.row(a) - places.row(b)).squaredNorm() > width * width)
+          continue;
+        if (distance(b, result[a]) < distance(a, result[b]))
+          result[b] = result[a];
+        else
+          result[a] = result[b];
+        changed = true;
+      }
+  }
+  return result;
 }
 
 namespace {

@@ -41,6 +41,9 @@ struct ARAPFIELDS_EXPORT NodeSight {
   /// Whether points that are nearest to a node may lie on the side of another.
   bool is_doubtful(SurfaceSide node) const { return doubtful_[static_cast<std::size_t>(node)]; }
 
+  /// Whether a point on the side of one node does not see the other one.
+  bool hides(SurfaceSide node, SurfaceSide other) const;
+
   /// Points of the surface near doubtful nodes, with their sides, for queries that know nothing but their
   /// position.
   void set_places(PointsIn places, std::vector<SurfaceSide> sides);
@@ -83,8 +86,12 @@ struct ARAPFIELDS_EXPORT InteriorEmbedding {
   /// rows of the points near doubtful nodes.
   std::vector<SurfaceSide> sides_of(PointsIn points, PointsIn normals, const InsideSight& mesh,
                                     std::vector<Index>* doubtful = nullptr) const;
-  /// The same of a mesh's vertices, in mesh coordinates; `frame` is that of the nodes' cube.
+  /// The same of a mesh's vertices, in mesh coordinates; `frame` is that of the nodes' cube. The ends of a
+  /// short edge lie on sides that see each other, so that no such edge is torn.
   std::vector<SurfaceSide> sides_of(const TriangleMesh& mesh, const Frame& frame) const;
+  /// The same for a mesh whose triangles face outwards.
+  std::vector<SurfaceSide> sides_of(const TriangleMesh& outward, const Frame& frame, const InsideSight& sight,
+                                    std::vector<Index>* doubtful = nullptr) const;
 };
 
 /// Makes the sight of the surface when it is needed; null where the surface is not known.

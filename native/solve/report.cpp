@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "solve/field_measures.h"
+#include "solve/mesh_measures.h"
 #include "solve/setup.h"
 #include "solve/warnings.h"
 
@@ -101,7 +102,16 @@ Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples&
   solution.report = measure(*solution.field, samples, terms);
   const std::optional<FarTarget> far = far_target(terms.handles, samples.points);
   if (far) solution.report.far_target = far->sizes;
+  std::vector<std::string> of_mesh;
+  if (samples.mesh) {
+    const MeshMeasures mesh = measure_triangles(*solution.field, *samples.mesh);
+    Distortion& distortion = solution.report.distortion;
+    merge(distortion, mesh.distortion);
+    distortion.flipped_share = std::max(distortion.flipped_share, mesh.distortion.flipped_share);
+    of_mesh = warnings_on(mesh);
+  }
   solution.report.warnings = warnings_on(solution.report.distortion, far, terms.handles);
+  for (std::string& warning : of_mesh) solution.report.warnings.push_back(std::move(warning));
   solution.report.loop = std::move(loop);
   return solution;
 }

@@ -58,16 +58,18 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
       sites, normals, axis, may_join ? sites_may_join : MayJoin(), samples.mesh ? make_sight : MakeSight());
   if (made && made->sight) {
     // Samples and vertices know their sides by the mesh; other points take that of the nearest of them.
-    const Index count = samples.size(), vertices = samples.mesh->vertices.rows();
-    Points places(count + vertices, 3), directions(count + vertices, 3);
-    places << samples.points, samples.frame.to_cube(samples.mesh->vertices);
-    directions << samples.normals, vertex_normals(*samples.mesh);
-    std::vector<Index> near;
-    const std::vector<SurfaceSide> sides = made->sides_of(places, directions, *sight, &near);
-    made->sight->keep(samples.mesh, {sides.begin() + count, sides.end()});
+    std::vector<Index> near, near_vertices;
+    const std::vector<SurfaceSide> sides = made->sides_of(samples.points, samples.normals, *sight, &near);
+    std::vector<SurfaceSide> of_vertices =
+        made->sides_of(*samples.mesh, samples.frame, *sight, &near_vertices);
+    Points places(std::ssize(near) + std::ssize(near_vertices), 3);
+    places << rows_of(samples.points, near),
+        samples.frame.to_cube(rows_of(samples.mesh->vertices, near_vertices));
     std::vector<SurfaceSide> near_sides;
     for (const Index i : near) near_sides.push_back(sides[static_cast<std::size_t>(i)]);
-    made->sight->set_places(rows_of(places, near), std::move(near_sides));
+    for (const Index i : near_vertices) near_sides.push_back(of_vertices[static_cast<std::size_t>(i)]);
+    made->sight->keep(samples.mesh, std::move(of_vertices));
+    made->sight->set_places(places, std::move(near_sides));
   }
   embedding = made;
 }
