@@ -84,6 +84,7 @@ class Op(StrEnum):
     FIELD_NODES = "arapfields.field_as_nodes"
     REMOVE_BAKE = "arapfields.remove_bake"
     EXPORT = "arapfields.export_animation"
+    EXPORT_SPLATS = "arapfields.export_splats"
     PIN_TOOL = "arapfields.pin_tool"
     PIN_HOVER = "arapfields.pin_hover"
     PIN_DRAG = "arapfields.pin_drag"

@@ -26,7 +26,12 @@ CONTENTS = [  # modules with CLASSES
     *("stiffness.operators", "stiffness.panel"),
     *("contact.operators", "contact.panel"),
     *("live.operators", "live.panel", "pin_tool.operators", "animation.operators"),
-    *("animation.export_operators", "animation.nodes_operator", "animation.panel"),
+    *(
+        "animation.export_operators",
+        "animation.splat_operators",
+        "animation.nodes_operator",
+        "animation.panel",
+    ),
     *("results.operators", "results.panel", "jobs.operators", "jobs.panel"),
     *("menus", "preferences"),
 ]

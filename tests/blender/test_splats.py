@@ -211,7 +211,7 @@ def test_what_splats_lack_is_named():
     data = item.data
     for call, arguments, word in (
         (bpy.ops.arapfields.deform, {"result": "NEW"}, "choose Original Mesh as geometry"),
-        (bpy.ops.arapfields.bake, {}, "write a PLY a frame by arapfields animate"),
+        (bpy.ops.arapfields.export_animation, {}, "Export Splats and Bake Animation write them"),
     ):
         with pytest.raises(RuntimeError, match=word):
             call(**arguments)
