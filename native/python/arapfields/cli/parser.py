@@ -9,6 +9,7 @@ import arapfields as af
 
 from . import skinning, transferring, verbs, wrapping
 from .animate import animate
+from .describe import Describe
 from .flags import (
     MESH,
     SOURCE,
@@ -24,6 +25,9 @@ from .flags import (
 from .one_line import OneLineParser
 from .options import add_option_flag, add_option_flags, shard
 from .touching import contact_flags
+
+EXIT_CODES = {0: "done", 1: "failed", 2: "bad input or usage", 130: "interrupted"}
+
 
 class CMakeDir(argparse.Action):
     """Action that prints arapfields_DIR."""
@@ -43,10 +47,16 @@ def _parser():
     parser = OneLineParser(
         prog="arapfields",
         description="Neural implicit surfaces from meshes, deformed as rigidly as possible.",
-        epilog="Exit codes: 0 done, 1 failed, 2 bad input or usage, 130 interrupted. "
+        epilog=f"Exit codes: {', '.join(f'{code} {text}' for code, text in EXIT_CODES.items())}. "
         "`arapfields VERB --help` shows a verb's flags and examples.",
     )
     parser.add_argument("--version", action="version", version=f"arapfields {af.__version__}")
+    parser.add_argument(
+        "--describe",
+        action=Describe,
+        told=(af.__version__, EXIT_CODES),
+        help="print all verbs and flags as JSON, and exit",
+    )
     parser.add_argument(
         "--cmake-dir", action=CMakeDir, nargs=0, help="print where CMake finds the C++ package, and exit"
     )
@@ -63,6 +73,7 @@ def _verb(added, name, run, summary, *examples):
     raw = argparse.RawDescriptionHelpFormatter
     parser = added.add_parser(name, help=summary, description=summary, epilog=shown, formatter_class=raw)
     parser.set_defaults(run=run)
+    parser.examples = [f"arapfields {name} {example}" for example in examples]
     return parser
 
 
