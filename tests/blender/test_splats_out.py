@@ -72,7 +72,7 @@ def test_what_is_shown_is_written_in_each_format(tmp_path):
         assert bpy.ops.arapfields.export_splats(filepath=str(tmp_path / name)) == {"FINISHED"}
     assert gap(af.GaussianSplats.load(tmp_path / "a.ply"), wanted) < CLOSE
     back, name = written_splats.gltf(tmp_path / "b.glb")
-    assert name == "Scan" and gap(back.transformed(written_splats.FROM_Y_UP), wanted) < CLOSE
+    assert name == "Scan" and gap(written_splats.with_z_up(back), wanted) < CLOSE
     item.modifiers[0].show_viewport = False
     bpy.ops.arapfields.export_splats(filepath=str(tmp_path / "rest.ply"))
     rest = given().transformed(np.array(item.matrix_world))
@@ -127,7 +127,7 @@ def test_a_bake_writes_the_frames_that_live_mode_shows(tmp_path):
         path = tmp_path / "scans" / f"untitled~Scene~Scan.{frame:04d}.ply"
         one, other = af.GaussianSplats.load(path), written_splats.gltf(path.with_suffix(".glb"))[0]
         assert gap(one, seen(item)) < CLOSE
-        assert gap(one, other.transformed(written_splats.FROM_Y_UP)) < CLOSE
+        assert gap(one, written_splats.with_z_up(other)) < CLOSE
     assert np.abs(one.centers - given().centers).max() > 0.5
 
 

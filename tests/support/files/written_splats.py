@@ -12,6 +12,15 @@ KINDS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 FROM_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
+def with_z_up(splats):
+    """Splats of a glTF file as Blender imports them: all turned, and their own axes exchanged likewise."""
+    turned, (w, x, y, z) = splats.transformed(FROM_Y_UP), splats.rotations.T
+    rotations = np.column_stack([w, x, -z, y])
+    return af.GaussianSplats(
+        turned.centers, rotations, splats.scales[:, [0, 2, 1]], splats.opacities, turned.harmonics
+    )
+
+
 def gltf(path):
     """(GaussianSplats of the one primitive of a .glb, name of its node); what the specifications ask of the
     file is asserted."""
