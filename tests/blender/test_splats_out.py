@@ -10,10 +10,10 @@ from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
-    from blender.test_splats import file_values, given, own_values, places, scan, shown, vector_values  # noqa: F401
     from mathutils import Matrix
-    from support.blender import scenes
+    from support.blender import scans, scenes
     from support.blender.live import step
+    from support.blender.scans import file_values, given, places, scan, shown
     from support.files import written_splats
     from support.files.full_disk import files_of_at_most
 
@@ -81,7 +81,7 @@ def test_what_is_shown_is_written_in_each_format(tmp_path):
 
 @pytest.mark.parametrize("layout", ["vector_values", "own_values"])
 def test_other_layouts_are_written_alike(layout, tmp_path):
-    _, moving = scan(given(), globals()[layout])
+    _, moving = scan(given(), getattr(scans, layout))
     bpy.ops.arapfields.live()
     moving.location.z += 0.4
     step(refined=True)
