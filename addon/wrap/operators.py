@@ -28,7 +28,7 @@ from ..properties.choices import result_properties
 from ..results.placement import holds_place
 from . import keys, landmarks, transfer
 from .matching import Match, Wrapped
-from .properties import carried_kinds, fit_rig, move_object
+from .properties import carried_kinds, fit_rig, groups, mix, move_object
 
 onto = text(
     "Onto", "Name of the mesh object to wrap onto; empty for the one in the settings", options={"SKIP_SAVE"}
@@ -199,7 +199,12 @@ class ARAPFIELDS_OT_transfer(JobOperator, bpy.types.Operator):
     title = "Transfer to Target"
     guide = "wrap"
 
-    __annotations__ = {"onto": onto, "transfer": carried_kinds(options={"SKIP_SAVE"})}
+    __annotations__ = {
+        "onto": onto,
+        "transfer": carried_kinds(options={"SKIP_SAVE"}),
+        "groups": groups(options={"SKIP_SAVE"}),
+        "mix": mix(options={"SKIP_SAVE"}),
+    }
 
     @classmethod
     def refuses(cls, source):
@@ -212,9 +217,12 @@ class ARAPFIELDS_OT_transfer(JobOperator, bpy.types.Operator):
         refuse(transfer.refusal(source, target) or (keys.refusal(source, target) if has_keys else None))
         layers.uncover(source)
         match = Match(context, source, target, has_keys)
+        wrap = settings_of(source).wrap
+        named = effective_value("groups", wrap, self) if "GROUPS" in kinds else ""
+        mixed = transfer.groups_named(match.given.groups, named, source), effective_value("mix", wrap, self)
 
         def apply(_):
-            work = transfer.Transfer(bpy.context, *match.get(), match)
+            work = transfer.Transfer(bpy.context, *match.get(), match, *mixed)
             done = work.carry(kinds)
             return transfer.message(work.target, done, work.notes)
 

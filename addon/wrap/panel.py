@@ -55,6 +55,8 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
         job_button(layout, Op.WRAP, "MOD_SHRINKWRAP")
         factor_slider(layout, source)
         draw_settings(layout, wrap, "transfer")
+        if "GROUPS" in wrap.transfer:
+            draw_settings(layout, wrap, "groups", "mix")
         layout.operator(Op.TRANSFER, icon="MOD_DATA_TRANSFER")
         if rest_bones.fitted(source):
             layout.operator(Op.RESET_BONES, icon="BONE_DATA")
