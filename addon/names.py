@@ -59,6 +59,7 @@ class Op(StrEnum):
     WRAP_SEQUENCE = "arapfields.wrap_sequence"
     SKIN = "arapfields.skin"
     TRANSFER = "arapfields.transfer"
+    REFIT = "arapfields.refit"
     ADD_LANDMARK = "arapfields.add_landmark"
     CLICK_LANDMARKS = "arapfields.click_landmarks"
     SUGGEST_LANDMARKS = "arapfields.suggest_landmarks"

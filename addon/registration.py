@@ -20,7 +20,7 @@ CONTENTS = [  # modules with CLASSES
     *("handles.operators", "handles.resizing", "handles.left_behind", "handles.panel"),
     *("deform.operators", "deform.panel"),
     *("stylize.operators", "stylize.panel"),
-    *("wrap.operators", "wrap.clicking", "wrap.suggesting", "wrap.sheet", "wrap.panel"),
+    *("wrap.operators", "wrap.clicking", "wrap.suggesting", "wrap.refitting", "wrap.sheet", "wrap.panel"),
     *("skin.operators", "skin.panel"),
     *("carried.operators", "carried.panel", "poses.operators", "poses.panel"),
     *("stiffness.operators", "stiffness.panel"),

@@ -58,6 +58,7 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
         if "GROUPS" in wrap.transfer:
             draw_settings(layout, wrap, "groups", "mix")
         layout.operator(Op.TRANSFER, icon="MOD_DATA_TRANSFER")
+        layout.operator(Op.REFIT, icon="MOD_CLOTH")
         if rest_bones.fitted(source):
             layout.operator(Op.RESET_BONES, icon="BONE_DATA")
         job_button(layout, Op.WRAP_SHEET, "IMAGE_DATA")
