@@ -36,7 +36,7 @@ def mapped(points):
 
 def surface(offset=0.0):
     parts = [(start, end, radius + offset) for start, end, radius in PARTS]
-    return af.extract_surface(Capsules(parts, af.Frame([0, 0, 0.85], 1.0)), resolution=96)[:2]
+    return af.extract_surface(Capsules(parts, af.Frame([0, 0, 0.85], 1.0)), resolution=64)[:2]
 
 
 def mesh_object(name, vertices, triangles):
