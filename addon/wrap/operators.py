@@ -10,7 +10,7 @@ from ..blender.language import about, translated
 from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
-from ..blender.property_definitions import annotations, effective_value, effective_values, integer, text
+from ..blender.property_definitions import annotations, effective_value, effective_values, integer
 from ..blender.source_operator import SourceOperator
 from ..carried import hanging, rest_bones
 from ..core.errors import UserError, refuse
@@ -28,11 +28,7 @@ from ..properties.choices import result_properties
 from ..results.placement import holds_place
 from . import keys, landmarks, transfer
 from .matching import Match, Wrapped
-from .properties import carried_kinds, fit_rig, groups, mix, move_object
-
-onto = text(
-    "Onto", "Name of the mesh object to wrap onto; empty for the one in the settings", options={"SKIP_SAVE"}
-)
+from .properties import carried_kinds, fit_rig, groups, mix, move_object, onto
 
 
 class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
@@ -45,7 +41,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
 
     __annotations__ = {
         **annotations(WRAP, options={"SKIP_SAVE"}),
-        "onto": onto,
+        "onto": onto(),
         "fit_rig": fit_rig(options={"SKIP_SAVE"}),
         "move_object": move_object(options={"SKIP_SAVE"}),
         **result_properties(),
@@ -200,7 +196,7 @@ class ARAPFIELDS_OT_transfer(JobOperator, bpy.types.Operator):
     guide = "wrap"
 
     __annotations__ = {
-        "onto": onto,
+        "onto": onto(),
         "transfer": carried_kinds(options={"SKIP_SAVE"}),
         "groups": groups(options={"SKIP_SAVE"}),
         "mix": mix(options={"SKIP_SAVE"}),

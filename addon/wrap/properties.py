@@ -66,6 +66,12 @@ def carried_kinds(options=()):
     )
 
 
+def onto():
+    """An operator's argument."""
+    tip = "Name of the mesh object to wrap onto; empty for the one in the settings"
+    return text("Onto", tip, options={"SKIP_SAVE"})
+
+
 def groups(**extra):
     tip = "Names of the vertex groups to transfer, with commas between; empty for all"
     return text("Groups", tip, **extra)

@@ -23,7 +23,7 @@ from ..core.settings.parameters import WRAP
 from ..handles.empties import matrix_of
 from ..jobs.job_operator import JobOperator
 from . import garments, landmarks, rigs
-from .operators import onto
+from .properties import onto
 
 FAR = 0.02  # of the target's diagonal: most median distance of a body that a saved field moves
 ROUNDS, SMOOTH = 12, 4  # of pushes out of the target; so many of them are smoothed first
@@ -38,7 +38,7 @@ class ARAPFIELDS_OT_refit(JobOperator, bpy.types.Operator):
     guide = "wrap"
 
     __annotations__ = {
-        "onto": onto,
+        "onto": onto(),
         "gap": number(
             "Gap",
             "Least distance of a garment's vertices from the target",
