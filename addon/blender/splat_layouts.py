@@ -86,7 +86,7 @@ class VectorLayout(FileLayout):
 class OwnLayout(FileLayout):
     """Blender's own, from 5.3 on, of point clouds that it draws as splats.
 
-    Not run there: names and types are those of its PLY import. Blender before 5.3 has no FLOAT4.
+    Names and types are those of its importers. Blender before 5.3 has no FLOAT4.
     """
 
     mark = "radiance:base"  # colours of degree 0, and opacity
