@@ -3,7 +3,7 @@
 # A Python that starts: names of pyenv's may lie in PATH and lead to none.
 PATH_OF = $(shell $(1) -c 'import sys; print(sys.executable)' 2> /dev/null)
 PYTHON ?= $(or $(call PATH_OF,python3.11),$(call PATH_OF,python3))
-PYTHON313 ?= $(call PATH_OF,python3.13)
+PYTHON313 ?= $(or $(call PATH_OF,python3.13),$(lastword $(sort $(wildcard $(HOME)/.pyenv/versions/3.13.*/bin/python3.13))))
 SHELL := /bin/bash
 .SHELLFLAGS := -o pipefail -c
 VENV := .venv
@@ -224,9 +224,10 @@ release: git-clone  ## all that is published, in dist: wheels, zips, index.json,
 	$(MAKE) --no-print-directory extension PLATFORM=all
 	$(PY) cmake/wheel/release.py --output dist
 
-# What PyPI has of other Blenders, for tests/blender/test_extension.py; the 5.2 needs a Python 3.13.
-blenders: build/blenders/4.2/.ready $(if $(PYTHON313),build/blenders/5.2/.ready)  ## other Blenders to test the extension in: build/blenders
-	@$(if $(PYTHON313),,echo "no python3.13 (PYTHON313=…): Blender 5.2 is left out")
+# What PyPI has of other Blenders, for tests/blender/test_extension.py; those from 5.1 on need a Python 3.13.
+NEWER := $(shell awk '$$2 == "3.13" {print "build/blenders/" $$1 "/.ready"}' tests/support/blender/versions.txt)
+blenders: build/blenders/4.2/.ready $(if $(PYTHON313),$(NEWER))  ## other Blenders to test the extension in: build/blenders
+	@$(if $(PYTHON313),,echo "no python3.13 (PYTHON313=…): Blenders from 5.1 on are left out")
 
 build/blenders/4.2/.ready:
 	$(PYTHON) -m venv build/blenders/4.2
@@ -234,9 +235,9 @@ build/blenders/4.2/.ready:
 	build/blenders/4.2/bin/python -m pip install -q --no-deps --target build/blenders/numpy2 "numpy==2.*"
 	@touch $@
 
-build/blenders/5.2/.ready:
-	$(PYTHON313) -m venv build/blenders/5.2
-	build/blenders/5.2/bin/python -m pip install -q "bpy==5.2.*"
+$(NEWER): build/blenders/%/.ready:
+	$(PYTHON313) -m venv build/blenders/$*
+	build/blenders/$*/bin/python -m pip install -q "bpy==$*.*"
 	@touch $@
 
 gallery: build $(VENV)/.tools  ## the documentation's pictures, rendered by the code

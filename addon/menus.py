@@ -37,6 +37,7 @@ class ARAPFIELDS_MT_object(bpy.types.Menu):
         layout.operator(Op.LIVE_KEEP, icon="CHECKMARK")
         layout.operator(Op.BAKE, icon="REC")
         layout.menu("ARAPFIELDS_MT_export", icon="EXPORT")
+        layout.operator(Op.EXPORT_SPLATS, icon="EXPORT")
         layout.operator(Op.FIELD_NODES, icon="GEOMETRY_NODES")
         layout.separator()
         layout.operator(Op.FIT, icon="MOD_REMESH")

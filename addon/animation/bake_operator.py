@@ -7,7 +7,6 @@ from ..blender.host import has_window
 from ..blender.language import about, translated
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import effective_value, flag
-from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError
 from ..field_modifier import layers
 from ..handles import empties
@@ -17,7 +16,7 @@ from ..wrap import landmarks
 from . import frames, object_bake
 from .bake_job import BakePass
 
-SETTINGS = ("format", "kind", "range", "step", "subframes", "loop")
+SETTINGS = ("format", "splat_format", "kind", "range", "step", "subframes", "loop")
 
 
 class BakeOperator(JobOperator):
@@ -133,11 +132,6 @@ def effective_kind(source, operator=None):
 
 def refusal_of(source, kind):
     """UserError that says why a source has nothing to bake; else None."""
-    if holds_splats(source):
-        return UserError(
-            "{name} holds splats; render them live, or write a PLY a frame by arapfields animate",
-            source,
-        )
     if kind == "WRAP":
         return None if settings_of(source).wrap.frames else landmarks.refusal(source)
     return empties.require_handles(source) if kind == "DEFORM" else style_settings.refusal(source)

@@ -10,6 +10,7 @@ from ..blender.host import has_window
 from ..blender.language import about, translated
 from ..blender.object_references import ObjectReference, settings_of, source_of
 from ..blender.property_definitions import choice, path_text, text
+from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError
 from ..core.runtime.jobs import Item
 from ..core.settings.choices import EXPORT_FORMATS
@@ -33,9 +34,10 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
     folder = None  # of the caches that are played while the exporter runs
     output_folder = None  # of the file
     guide = "animation"
+    used = ("kind", "range", "step", "subframes", "loop")
 
     __annotations__ = {
-        **{name: one for name, one in settings(options={"SKIP_SAVE"}).items() if name != "format"},
+        **{name: one for name, one in settings(options={"SKIP_SAVE"}).items() if not name.endswith("format")},
         "format": choice(EXPORT_FORMATS, "Format", "What kind of file", options={"SKIP_SAVE"}),
         "filepath": path_text(
             "File",
@@ -74,6 +76,8 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
     @classmethod
     def refuses(cls, source):
         """An object that plays a cache is exported as it is; others are solved first."""
+        if holds_splats(source):
+            return UserError("{name} holds splats; Export Splats and Bake Animation write them", source)
         return None if cache_modifier.is_playing(source) else super().refuses(source)
 
     def places(self, context):

@@ -6,15 +6,17 @@ from ..blender.language import about, translated
 from ..blender.object_references import settings_of, source_of
 from ..blender.property_definitions import effective_value, path_text
 from ..blender.source_operator import SourceOperator
+from ..blender.splat_layouts import holds_splats
 from ..carried.carried_objects import carrier_class
 from ..carried.carriers import MeshCarrier
 from ..carried.points import AttributeCarrier
 from ..core.errors import UserError
 from ..field_modifier import cache_modifier
-from . import caches, carried_bake
+from . import caches, carried_bake, splat_files
 from .bake_operator import BakeOperator, effective_kind, refusal_of
 from .object_bake import ObjectBake
 from .properties import folder, settings
+from .splat_bake import SplatBake
 from .wrap_bake import WrapBake, frames_of, scans_in
 
 
@@ -39,8 +41,10 @@ class CacheOperator(BakeOperator):
     }
 
     def path(self, context, source, active, values):
-        """The path by cache_path(); None for shape keys."""
+        """The path by cache_path(); None for shape keys. That of splats may be of a file for each frame."""
         suffix = caches.SUFFIXES.get(values["format"])
+        if holds_splats(source):
+            suffix = splat_files.SUFFIXES[values["splat_format"]]
         if suffix is None:
             return None
         folder = effective_value("folder", settings_of(active).bake, self)
@@ -64,6 +68,8 @@ class CacheOperator(BakeOperator):
                         path=place.name,
                     )
                 found[place] = caches.is_own(item, place, named=not self.filepath)
+                if holds_splats(item):
+                    found |= dict.fromkeys(splat_files.frames_there(place)[:1], found[place])
         return found
 
     def plan_frames(self, context, job):
@@ -122,6 +128,8 @@ class ARAPFIELDS_OT_bake(CacheOperator, bpy.types.Operator):
 
     def bake_of(self, context, source, kind, frames, path, values):
         part = tuple(self.part) if any(self.part) else None
+        if holds_splats(source):
+            return SplatBake(context, source, kind, frames, path, part=part, loop=values["loop"])
         if part is not None and (values["format"] == "KEYS" or not 1 <= part[0] <= part[1]):
             raise UserError(
                 "Part {i} of {n}: caches alone have parts, from 1 of N to N of N", i=part[0], n=part[1]
@@ -140,7 +148,9 @@ class ARAPFIELDS_OT_wrap_sequence(CacheOperator, bpy.types.Operator):
     scans = None  # {frame: ObjectReference} of a collection
 
     __annotations__ = {
-        name: one for name, one in settings(options={"SKIP_SAVE"}).items() if name not in ("kind", "loop")
+        name: one
+        for name, one in settings(options={"SKIP_SAVE"}).items()
+        if name not in ("splat_format", "kind", "loop")
     }
 
     @classmethod

@@ -5,6 +5,7 @@ from ..blender import modifier_stack
 from ..blender.language import translated
 from ..blender.point_data import points_of
 from ..blender.section import Section, draw_settings, job_button, modifier_row, note, wrapped
+from ..blender.splat_layouts import holds_splats
 from ..names import Op
 from ..solver import frame_range
 from . import caches, played
@@ -17,16 +18,21 @@ class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
 
     def fill(self, context, source, settings):
         layout, bake = self.layout, settings.bake
-        draw_settings(layout, bake, "format", "kind", "range")
+        is_scan = holds_splats(source)
+        draw_settings(layout, bake, "splat_format" if is_scan else "format", "kind", "range")
         if bake.range == "CUSTOM":
             column = layout.column(align=True)
             column.prop(bake, "start")
             column.prop(bake, "end")
         loops = ["loop"] if settings.secondary.use else []
-        folders = ["folder"] if bake.format != "KEYS" else []
+        folders = ["folder"] if is_scan or bake.format != "KEYS" else []
         draw_settings(layout, bake, "step", "subframes", *loops, *folders)
-        wrapped(layout, weight(context, source, bake))
+        if not is_scan:
+            wrapped(layout, weight(context, source, bake))
         job_button(layout, Op.BAKE, "REC")
+        if is_scan:
+            layout.operator(Op.EXPORT_SPLATS, icon="EXPORT")
+            return
         modifier = modifier_stack.find_cache(source)
         if modifier is not None:
             modifier_row(layout, modifier, "MOD_MESHDEFORM", Op.REMOVE_BAKE)

@@ -4,7 +4,7 @@
 import bpy
 
 from ..blender.property_definitions import choice, flag, integer, path_text, text
-from ..core.settings.choices import BAKE_FORMATS, BAKE_KINDS, BAKE_RANGES
+from ..core.settings.choices import BAKE_FORMATS, BAKE_KINDS, BAKE_RANGES, SPLAT_FORMATS
 
 FOLDER = "//cache"
 
@@ -13,6 +13,7 @@ def settings(**extra):
     """Properties of the object that are also operator arguments, which override them for one call."""
     return {
         "format": choice(BAKE_FORMATS, "Format", "What plays the frames", **extra),
+        "splat_format": choice(SPLAT_FORMATS, "Splats", "What files the frames of splats go to", **extra),
         "kind": choice(BAKE_KINDS, "Bake", "What is baked", **extra),
         "range": choice(BAKE_RANGES, "Range", "Which frames are baked", **extra),
         "start": integer("Start", "First frame", default=1, **extra),

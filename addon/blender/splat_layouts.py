@@ -86,7 +86,7 @@ class VectorLayout(FileLayout):
 class OwnLayout(FileLayout):
     """Blender's own, from 5.3 on, of point clouds that it draws as splats.
 
-    Not run there: names and types are those of its PLY import. Blender before 5.3 has no FLOAT4.
+    Names and types are those of its importers. Blender before 5.3 has no FLOAT4.
     """
 
     mark = "radiance:base"  # colours of degree 0, and opacity
@@ -143,8 +143,8 @@ class Splats:
     def __init__(self, name, mesh, centers):
         self.layout, columns = layout_of(mesh), columns_of(mesh)
         self.rest = {key: read(name, mesh, key, kind) for key, kind in columns.items()}
-        fixed = {key: read(name, mesh, key, *kinds) for key, kinds in self.layout.fixed.items()}
-        turns, scales, alpha, colours = self.layout.arrays(self.rest, fixed)
+        self.fixed = {key: read(name, mesh, key, *kinds) for key, kinds in self.layout.fixed.items()}
+        turns, scales, alpha, colours = self.layout.arrays(self.rest, self.fixed)
         count = next((count for count in COUNTS if colours.shape[1] == count), None)
         if count is None:
             raise UserError(
@@ -158,11 +158,19 @@ class Splats:
         if not (lengths > 0).all():
             raise UserError("{name}: a splat's rotation is zero", name=name)
         self.arrays = centers, turns / lengths, scales, np.clip(alpha, LEAST, 1 - LEAST), colours
+        self.attributes = dict(self.rest)  # those at rest by their own names
         self.layout.begin(self.rest)
 
     def made(self, library):
         """The native GaussianSplats."""
         return library.GaussianSplats(*self.arrays)
+
+    def posed(self, library, centers, changes):
+        """The native GaussianSplats with changes() added to the attributes."""
+        moved = {key: values + changes[key] for key, values in self.attributes.items()}
+        turns, scales, _, colours = self.layout.arrays(moved, self.fixed)
+        turns = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+        return library.GaussianSplats(centers, turns, scales, self.arrays[3], colours)
 
     def changes(self, prepared, field):
         """((n, 3) centers moved by a field, {attribute: its change})."""

@@ -10,7 +10,7 @@ from ..blender.language import about, translated
 from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
-from ..blender.property_definitions import annotations, effective_value, effective_values, integer, text
+from ..blender.property_definitions import annotations, effective_value, effective_values, integer
 from ..blender.source_operator import SourceOperator
 from ..carried import hanging, rest_bones
 from ..core.errors import UserError, refuse
@@ -28,11 +28,7 @@ from ..properties.choices import result_properties
 from ..results.placement import holds_place
 from . import keys, landmarks, transfer
 from .matching import Match, Wrapped
-from .properties import carried_kinds, fit_rig, move_object
-
-onto = text(
-    "Onto", "Name of the mesh object to wrap onto; empty for the one in the settings", options={"SKIP_SAVE"}
-)
+from .properties import carried_kinds, fit_rig, groups, mix, move_object, onto
 
 
 class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
@@ -45,7 +41,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
 
     __annotations__ = {
         **annotations(WRAP, options={"SKIP_SAVE"}),
-        "onto": onto,
+        "onto": onto(),
         "fit_rig": fit_rig(options={"SKIP_SAVE"}),
         "move_object": move_object(options={"SKIP_SAVE"}),
         **result_properties(),
@@ -199,7 +195,12 @@ class ARAPFIELDS_OT_transfer(JobOperator, bpy.types.Operator):
     title = "Transfer to Target"
     guide = "wrap"
 
-    __annotations__ = {"onto": onto, "transfer": carried_kinds(options={"SKIP_SAVE"})}
+    __annotations__ = {
+        "onto": onto(),
+        "transfer": carried_kinds(options={"SKIP_SAVE"}),
+        "groups": groups(options={"SKIP_SAVE"}),
+        "mix": mix(options={"SKIP_SAVE"}),
+    }
 
     @classmethod
     def refuses(cls, source):
@@ -212,9 +213,12 @@ class ARAPFIELDS_OT_transfer(JobOperator, bpy.types.Operator):
         refuse(transfer.refusal(source, target) or (keys.refusal(source, target) if has_keys else None))
         layers.uncover(source)
         match = Match(context, source, target, has_keys)
+        wrap = settings_of(source).wrap
+        named = effective_value("groups", wrap, self) if "GROUPS" in kinds else ""
+        mixed = transfer.groups_named(match.given.groups, named, source), effective_value("mix", wrap, self)
 
         def apply(_):
-            work = transfer.Transfer(bpy.context, *match.get(), match)
+            work = transfer.Transfer(bpy.context, *match.get(), match, *mixed)
             done = work.carry(kinds)
             return transfer.message(work.target, done, work.notes)
 

@@ -55,7 +55,10 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
         job_button(layout, Op.WRAP, "MOD_SHRINKWRAP")
         factor_slider(layout, source)
         draw_settings(layout, wrap, "transfer")
+        if "GROUPS" in wrap.transfer:
+            draw_settings(layout, wrap, "groups", "mix")
         layout.operator(Op.TRANSFER, icon="MOD_DATA_TRANSFER")
+        layout.operator(Op.REFIT, icon="MOD_CLOTH")
         if rest_bones.fitted(source):
             layout.operator(Op.RESET_BONES, icon="BONE_DATA")
         job_button(layout, Op.WRAP_SHEET, "IMAGE_DATA")

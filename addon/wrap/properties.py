@@ -10,6 +10,7 @@ from ..blender.property_definitions import (
     colour,
     flag,
     integer,
+    number,
     pointer,
     text,
 )
@@ -65,6 +66,22 @@ def carried_kinds(options=()):
     )
 
 
+def onto():
+    """An operator's argument."""
+    tip = "Name of the mesh object to wrap onto; empty for the one in the settings"
+    return text("Onto", tip, options={"SKIP_SAVE"})
+
+
+def groups(**extra):
+    tip = "Names of the vertex groups to transfer, with commas between; empty for all"
+    return text("Groups", tip, **extra)
+
+
+def mix(**extra):
+    tip = "How much of the object's weights the target takes; the rest of each stays its own"
+    return number("Mix", tip, default=1.0, min=0.0, max=1.0, subtype="FACTOR", **extra)
+
+
 class ARAPFIELDS_PG_landmark(bpy.types.PropertyGroup):
     rest: pointer(bpy.types.Object, "Landmark", "Empty on the object at rest")
     on_target: pointer(bpy.types.Object, "On the Target", "Empty where it belongs on the target")
@@ -94,6 +111,8 @@ class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
         "fit_rig": fit_rig(),
         "move_object": move_object(),
         "transfer": carried_kinds(),
+        "groups": groups(),
+        "mix": mix(),
         "target_mark": text("Target's Mark", "What tells whether the target is as it was wrapped onto"),
         "shown_keys": text("Shown Keys", "Values of the shape keys that the wrap was made with, as JSON"),
         **annotations(WRAP),

@@ -37,13 +37,25 @@ def refusal(source, target):
     return mesh_arrays.nothing_in(target.name, len(target.data.vertices), len(target.data.polygons))
 
 
-class Transfer:
-    """Transfers data from the source's wrapped mesh to the target's own mesh, by a Match."""
+def groups_named(groups, text, source):
+    """{name: weights} of the groups whose names a text has between commas; all for an empty one."""
+    names = [text] if text in groups else [name.strip() for name in text.split(",") if name.strip()]
+    for name in names:
+        if name not in groups:
+            raise UserError("{name} has no vertex group {group}", source, group=name)
+    return {name: groups[name] for name in names or groups}
 
-    def __init__(self, context, source, target, match):
+
+class Transfer:
+    """Transfers data from the source's wrapped mesh to the target's own mesh, by a Match.
+
+    `weights`: {name: (n,)} of the vertex groups to transfer, of which the target takes the share `mix`.
+    """
+
+    def __init__(self, context, source, target, match, weights, mix):
         self.context, self.source, self.target, self.match = context, source, target, match
         self.given, self.moved, self.own, self.places = match.given, match.moved, match.own, match.places
-        self.notes = []
+        self.weights, self.mix, self.notes = weights, mix, []
 
     def carry(self, kinds):
         """Transfers these kinds of data; returns {label: count}."""
@@ -68,11 +80,14 @@ class Transfer:
         return 0 if displacements is None else keys.carry(self.source, self.target, displacements)
 
     def groups(self):
-        done = 0
-        for name, weights in self.given.groups.items():
-            there = self.target.vertex_groups.get(name)
+        done, groups = 0, self.target.vertex_groups
+        own = vertex_groups.weights_in(
+            self.target.data, {name: groups[name].index for name in self.weights if name in groups}
+        )
+        for name, weights in self.weights.items():
+            there = groups.get(name)
             if there is None or not there.lock_weight:
-                carried = self.places.values(weights)
+                carried = self.mix * self.places.values(weights) + (1.0 - self.mix) * own.get(name, 0.0)
                 vertex_groups.put(self.target, name, np.where(carried > LEAST_WEIGHT, carried, 0.0))
                 done += 1
         return done

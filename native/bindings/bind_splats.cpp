@@ -10,8 +10,10 @@
 #include "bindings/files.h"
 #include "core/parallel.h"
 #include "io/splat_file.h"
+#include "io/splat_gltf.h"
 #include "splats/move_splats.h"
 #include "splats/sample_splats.h"
+#include "splats/transform_splats.h"
 
 namespace arapfields::python {
 namespace {
@@ -150,6 +152,27 @@ InvalidInput for other shapes and values.)")
           "path"_a, py::kw_only(), "task"_a = py::none(),
           "Writes a binary PLY file in the common layout, in whole or not at all. OSError where the system "
           "refuses.")
+      .def(
+          "save_gltf",
+          [](const Kept& self, const PathArgument& path, const std::string& name, Task* task) {
+            const std::string place = as_path(path);
+            run_long(task, [&](const Progress& progress) { save_splats_gltf(place, *self, name, progress); });
+          },
+          "path"_a, "name"_a = "Splats", py::kw_only(), "task"_a = py::none(), R"(
+Writes a binary glTF file (.glb) with the extension KHR_gaussian_splatting, in whole or not at all.
+
+Coordinates are written as they are; glTF's y is up, see transformed(). `name`: that of the object in it. OSError
+where the system refuses.)")
+      .def(
+          "transformed",
+          [](const Kept& self, const ArrayArgument& matrix, Task* task) {
+            const Mat4 motion = as_matrix4(matrix, "matrix");
+            return run_long(
+                task, [&](const Progress& progress) { return transform_splats(*self, motion, progress); });
+          },
+          "matrix"_a, py::kw_only(), "task"_a = py::none(), R"(
+The splats under an affine map (4, 4) that mirrors nothing: centers, covariances A Σ Aᵀ, and colours turned by the
+rotation closest to A. InvalidInput for other matrices.)")
       .def_static(
           "load",
           [](const PathArgument& path, Task* task) {

@@ -5,6 +5,6 @@ import pytest
 from support.blender import blenders
 
 
-@pytest.mark.parametrize("name", ["4.2", "4.5", "5.2"])
+@pytest.mark.parametrize("name", blenders.VERSIONS)
 def test_the_modifier_works_without_the_library(name, tmp_path):
     assert "modifier works in" in blenders.find(name, tmp_path).run("modifier_alone.py").stdout

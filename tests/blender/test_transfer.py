@@ -13,7 +13,7 @@ if IN_BLENDER:
     from support.blender.wraps import SMALL, offsets, rigged_bar, soup_of
 
     import arapfields as af
-    from addon.blender import mesh_arrays
+    from addon.blender import mesh_arrays, vertex_groups
     from addon.carried import rest_bones
     from addon.field_modifier import motion
 
@@ -204,3 +204,32 @@ def test_clothes_of_a_wrapped_shape_are_posed_with_it():
     rig.pose.bones["Upper"].rotation_mode, rig.pose.bones["Upper"].rotation_euler.x = "XYZ", 0.8
     assert away() < 2 * before
     assert [m.type for m in worn.modifiers] == ["NODES", "ARMATURE"]
+
+
+def weights_of(item, name):
+    indices = {name: item.vertex_groups[name].index}
+    return vertex_groups.weights_in(item.data, indices)[name]
+
+
+def test_single_groups_mix_with_what_the_target_has():
+    item, target, _ = wrapped_bar()
+    item.vertex_groups.new(name="Left, Arm").add(range(40), 0.25, "REPLACE")
+    count = len(target.data.vertices)
+    target.vertex_groups.new(name="Upper").add(range(count), 0.5, "REPLACE")
+    target.vertex_groups.new(name="Lower").add(range(count), 0.125, "REPLACE")
+    upper, lower = (weights_of(item, name)[::-1] for name in ("Upper", "Lower"))
+    only = {"transfer": {"GROUPS"}}
+    assert bpy.ops.arapfields.transfer(**only, groups="Upper", mix=0.25) == {"FINISHED"}
+    assert np.abs(weights_of(target, "Upper") - 0.25 * upper - 0.75 * 0.5).max() < 2 * SINGLE
+    assert sorted(group.name for group in target.vertex_groups) == ["Lower", "Upper"]
+    assert np.abs(weights_of(target, "Lower") - 0.125).max() == 0
+    assert bpy.ops.arapfields.transfer(**only, groups="Left, Arm", mix=0.5) == {"FINISHED"}
+    assert (
+        np.abs(weights_of(target, "Left, Arm") - 0.5 * weights_of(item, "Left, Arm")[::-1]).max() < 2 * SINGLE
+    )
+    item.arapfields.wrap.groups, item.arapfields.wrap.mix = "Lower, Upper", 1.0
+    assert bpy.ops.arapfields.transfer(**only) == {"FINISHED"}
+    for name, wanted in (("Upper", upper), ("Lower", lower)):
+        assert np.abs(weights_of(target, name) - wanted).max() < 2 * SINGLE
+    with pytest.raises(RuntimeError, match="Bar has no vertex group Tail"):
+        bpy.ops.arapfields.transfer(**only, groups="Upper, Tail")

@@ -18,6 +18,14 @@ def splat_calls(things):
     return {
         "GaussianSplats": lambda: (af.GaussianSplats, list(GIVEN)),
         "GaussianSplats.save": lambda: (by_name(splats.save, "task"), ["/nonexistent/x", af.Task()]),
+        "GaussianSplats.save_gltf": lambda: (
+            by_name(splats.save_gltf, "task"),
+            ["/nonexistent/x", "name", af.Task()],
+        ),
+        "GaussianSplats.transformed": lambda: (
+            by_name(splats.transformed, "task"),
+            [[[2, 0, 0, 1], [0, 3, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], af.Task()],
+        ),
         "GaussianSplats.load": lambda: (by_name(af.GaussianSplats.load, "task"), ["/nonexistent", af.Task()]),
         "GaussianSplats.is_file": lambda: (af.GaussianSplats.is_file, ["/nonexistent"]),
         "DeformationField.apply_to": lambda: (

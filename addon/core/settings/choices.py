@@ -92,6 +92,11 @@ BAKE_FORMATS = (
     ("MDD", "MDD Cache", "The same in the other format of that modifier, which more programs read"),
     ("KEYS", "Shape Keys", "An object with one shape key a frame, all in the .blend: for short ranges"),
 )
+SPLAT_FORMATS = (
+    ("PLY", "PLY", "A file a frame, in the common layout"),
+    ("GLTF", "glTF", "A .glb file a frame, with KHR_gaussian_splatting"),
+    ("USD", "USD", "A .usdc file with all frames, where this Blender's USD knows splats"),
+)
 BAKE_KINDS = (
     (
         "AUTO",

@@ -3,6 +3,8 @@
 #pragma once
 
 #include "io/splat_file.h"
+#include "io/splat_gltf.h"
 #include "splats/gaussian_splats.h"
 #include "splats/move_splats.h"
 #include "splats/sample_splats.h"
+#include "splats/transform_splats.h"

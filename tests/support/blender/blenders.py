@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Other Blender versions than this environment's bpy; `make blenders` installs those on PyPI.
 
-ARAPFIELDS_BLENDERS   folder of virtual environments with a bpy each, `4.2`, `5.2` (default build/blenders)
+ARAPFIELDS_BLENDERS   folder of virtual environments with a bpy each, by versions.txt (default build/blenders)
 ARAPFIELDS_BLENDER52  root folder of a system with a Blender 5.2 (default /opt/blender52), entered by chroot
 """
 
@@ -20,7 +20,11 @@ ROOT = Path(__file__).resolve().parents[3]
 SUPPORT = ROOT / "tests/support"
 FOLDER = Path(os.environ.get("ARAPFIELDS_BLENDERS", ROOT / "build/blenders"))
 CHROOT = Path(os.environ.get("ARAPFIELDS_BLENDER52", "/opt/blender52"))
-NAMES = ["4.5", "4.2", "4.2 with NumPy 2", "5.2", "5.2 in its window's build"]
+LINES = (SUPPORT / "blender/versions.txt").read_text().splitlines()
+PYTHONS = dict(line.split() for line in LINES if not line.startswith("#"))  # {version: its Python}
+OWN = "4.5"  # this environment's
+VERSIONS = [OWN, *(version for version in PYTHONS if version != OWN)]
+NAMES = [*VERSIONS, "4.2 with NumPy 2", "5.2 in its window's build"]
 
 
 @dataclass
@@ -77,7 +81,7 @@ def python_of(name):
 
 def find(name, folder):
     """The Blender of that name; skips the test if it is not installed."""
-    if name == "4.5":
+    if name == OWN:
         require_bpy()
         return Blender([sys.executable], folder)
     if name == "4.2 with NumPy 2":
@@ -85,9 +89,9 @@ def find(name, folder):
         if not numpy.is_dir():
             pytest.skip(f"no NumPy 2 at {numpy} (make blenders)")
         return Blender([str(python_of("4.2"))], folder, environment={"PYTHONPATH": str(numpy)})
-    if name == "4.2":
+    if PYTHONS.get(name) == PYTHONS[OWN]:
         return Blender([str(python_of(name))], folder)
-    if name == "5.2":  # PyPI's torch for its Python is large: our environment's C++ library is loaded instead
+    if name in PYTHONS:  # PyPI's torch for its Python is large: our environment's library is loaded instead
         torch = importlib.util.find_spec("torch")
         library = str(Path(torch.origin).parent / "lib/libtorch_cpu.so") if torch else ""
         return Blender([str(python_of(name))], folder, libtorch=library)

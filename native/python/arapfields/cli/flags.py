@@ -3,21 +3,25 @@
 
 import arapfields as af
 
+from . import usd
 from .handles import AddHandle, MoveHandle, triple
 from .options import add_option_flag
 from .touching import contact_flags
 
 MESH = "mesh: .ply, .obj, .stl or .off"
 SOURCE = f"{MESH}; or .safetensors: a signed distance that fit saved"
+SPLATS = "splats: .ply, .glb, or .usd, .usda, .usdc by usd-core"
 
 
 def solve_flags(parser):
     parser.add_argument("input", help=SOURCE)
     outputs = parser.add_argument_group("outputs (one or more)")
-    outputs.add_argument("-o", "--output", metavar="FILE", help="the input mesh with its vertices moved")
+    moved = f"the input mesh with its vertices moved; {SPLATS}"
+    outputs.add_argument("-o", "--output", metavar="FILE", help=moved)
     outputs.add_argument("--surface", metavar="FILE", help="the implicit surface, deformed (see --through)")
     outputs.add_argument("--save-field", metavar="FILE", help=".safetensors with the deformation field")
     report_flag(outputs)
+    up_axis_flag(parser)
     extraction_flags(parser)
     inverse_flag(parser)
     sdf_flag(parser)
@@ -113,6 +117,13 @@ def sdf_flag(parser):
         help="a mesh's implicit surface: its own triangles, as far as they lie between inside and outside, "
         "or a smooth fit, which takes a while and closes holes [exact]",
     )
+
+
+def up_axis_flag(parser):
+    text = (
+        "what is up in the input: USD has it in its header, and splats are turned for .glb, whose y is up [z]"
+    )
+    parser.add_argument("--up-axis", choices=usd.AXES, default="z", help=text)
 
 
 def report_flag(parser):

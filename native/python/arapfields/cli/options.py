@@ -36,14 +36,17 @@ def add_flag(group, option, **settings):
     text = f"{option['sentence']} [{_shown(option['default'])}]"
     settings["help"] = text.replace("%", "%%")
     if kind == "bool":
-        group.add_argument(f"--{name}", action=argparse.BooleanOptionalAction, **settings)
+        added = group.add_argument(f"--{name}", action=argparse.BooleanOptionalAction, **settings)
     elif kind in NUMBERS:
-        group.add_argument(
+        added = group.add_argument(
             f"--{name}", type=NUMBERS[kind], metavar="X" if kind == "float" else "N", **settings
         )
     else:
         choices = list(option["choices"]) if kind == "enum" else None
-        group.add_argument(f"--{name}", choices=choices, metavar=None if choices else "NAME", **settings)
+        added = group.add_argument(
+            f"--{name}", choices=choices, metavar=None if choices else "NAME", **settings
+        )
+    added.option = option  # for --describe
 
 
 def result_options(options):

@@ -7,21 +7,26 @@ from functools import partial
 
 import arapfields as af
 
-from . import skinning, transferring, usd, verbs, wrapping
+from . import skinning, transferring, verbs, wrapping
 from .animate import animate
+from .describe import Describe
 from .flags import (
     MESH,
     SOURCE,
+    SPLATS,
     extraction_flags,
     inverse_flag,
     report_flag,
     sdf_flag,
     solve_flags,
     style_flags,
+    up_axis_flag,
 )
 from .one_line import OneLineParser
 from .options import add_option_flag, add_option_flags, shard
 from .touching import contact_flags
+
+EXIT_CODES = {0: "done", 1: "failed", 2: "bad input or usage", 130: "interrupted"}
 
 
 class CMakeDir(argparse.Action):
@@ -42,10 +47,16 @@ def _parser():
     parser = OneLineParser(
         prog="arapfields",
         description="Neural implicit surfaces from meshes, deformed as rigidly as possible.",
-        epilog="Exit codes: 0 done, 1 failed, 2 bad input or usage, 130 interrupted. "
+        epilog=f"Exit codes: {', '.join(f'{code} {text}' for code, text in EXIT_CODES.items())}. "
         "`arapfields VERB --help` shows a verb's flags and examples.",
     )
     parser.add_argument("--version", action="version", version=f"arapfields {af.__version__}")
+    parser.add_argument(
+        "--describe",
+        action=Describe,
+        told=(af.__version__, EXIT_CODES),
+        help="print all verbs and flags as JSON, and exit",
+    )
     parser.add_argument(
         "--cmake-dir", action=CMakeDir, nargs=0, help="print where CMake finds the C++ package, and exit"
     )
@@ -62,6 +73,7 @@ def _verb(added, name, run, summary, *examples):
     raw = argparse.RawDescriptionHelpFormatter
     parser = added.add_parser(name, help=summary, description=summary, epilog=shown, formatter_class=raw)
     parser.set_defaults(run=run)
+    parser.examples = [f"arapfields {name} {example}" for example in examples]
     return parser
 
 
@@ -166,7 +178,7 @@ def _warp(added):
         added,
         "warp",
         verbs.warp,
-        "move any mesh, point set or curves by a saved field",
+        "move any mesh, splats, point set or curves by a saved field",
         "field.safetensors teeth.obj -o moved.obj",
         "field.safetensors fine.ply -o fine_posed.ply --share 0.5",
         "field.safetensors hair.obj -o hair_moved.obj --body spot.obj",
@@ -174,11 +186,17 @@ def _warp(added):
     )
     parser.add_argument("field", help=".safetensors that deform or stylize saved")
     parser.add_argument(
-        "input", help=f"{MESH}; curves: .obj; points: .ply, .xyz, .txt, .csv, .npy or .npz (points)"
+        "input",
+        help=f"{MESH}; splats: .ply; curves: .obj; points: .ply, .xyz, .txt, .csv, .npy or .npz (points)",
     )
     parser.add_argument(
-        "-o", "--output", required=True, metavar="FILE", help="a mesh, curves or points, as the input"
+        "-o",
+        "--output",
+        required=True,
+        metavar="FILE",
+        help=f"a mesh, curves or points, as the input; {SPLATS}",
     )
+    up_axis_flag(parser)
     parser.add_argument("--share", type=float, default=1.0, metavar="NUMBER", help="so much of the way [1]")
     parser.add_argument(
         "--body",
@@ -221,16 +239,17 @@ def _animate(added):
         "spot.obj --tracks walk.json -o walk.pc2 --shard 2/8",
         "spot.obj --tracks walk.json -o walk.pc2 --secondary --damping 2",
         "scan.ply --tracks walk.json -o walk.ply",
+        "scan.ply --tracks walk.json -o walk.usdc",
     )
     parser.add_argument("input", help=f"{MESH}; or splats")
     parser.add_argument("--tracks", required=True, metavar="FILE", help=".json or .npz, see docs/animate.md")
-    kinds = ".pc2, .mdd, or .usd, .usda, .usdc by usd-core; for splats .ply, one a frame"
+    kinds = ".pc2, .mdd, or .usd, .usda, .usdc by usd-core; for splats .ply or .glb, one a frame, or USD"
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help=kinds)
     parser.add_argument("--frames", nargs=2, type=int, metavar=("FIRST", "LAST"), help="these alone [all]")
     parser.add_argument(
         "--shard", type=shard, metavar="I/N", help="solve the part I of N; the last part writes the output"
     )
-    parser.add_argument("--up-axis", choices=usd.AXES, default="z", help="upward axis of the USD file [z]")
+    up_axis_flag(parser)
     contact_flags(parser)
     parser.add_argument("--secondary", action="store_true", help="lag behind the handles, and settle")
     add_option_flags(parser, "secondary", "secondary motion (--secondary)")

@@ -4,7 +4,7 @@
 import arapfields as af
 
 from .._files import existing_file
-from . import files, points
+from . import files, points, splat_files
 from .running import with_progress
 
 SOURCES = (*files.MESH_SUFFIXES, *files.STATE_SUFFIXES)
@@ -34,7 +34,8 @@ class Source:
     def write_moved(self, path, field):
         """Writes the mesh or splats moved by a field."""
         if self.splats:
-            field.apply_to(self.splats).save(path)
+            moved = field.apply_to(self.splats)
+            splat_files.write(path, moved, up=self._args.up_axis, name=self.path.stem)
         else:
             files.write_moved_mesh(path, self.path, self.mesh, field)
 

@@ -2,6 +2,7 @@
 """The functions of the verbs: read, check the outputs' paths, compute, write."""
 
 import argparse
+from pathlib import Path
 
 import numpy as np
 
@@ -10,7 +11,7 @@ import arapfields as af
 from .. import grids
 from .._files import json_text
 from .._streams import say
-from . import files, points
+from . import files, points, splat_files
 from .handles import build_handles, read_handles, rotation, triple, turn_upright
 from .options import given, given_options
 from .running import Outputs, with_progress
@@ -95,11 +96,11 @@ def extract(args):
 
 def warp(args):
     with Outputs() as outputs:
+        if af.GaussianSplats.is_file(args.input):
+            _warp_splats(args, outputs)
+            return
         output = outputs.check(args.output, points.WARPED, "--output")
         field = files.read_field(args.field)
-        if af.GaussianSplats.is_file(args.input):
-            _warp_splats(args, outputs, output, field)
-            return
         write = points.warped(args.input)
         body = af.sample_mesh(*files.read_mesh(args.body)) if args.body else None
 
@@ -112,13 +113,17 @@ def warp(args):
     summary(args, f"wrote {args.output}")
 
 
-def _warp_splats(args, outputs, output, field):
+def _warp_splats(args, outputs):
+    output = outputs.check(args.output, splat_files.SUFFIXES, "--output")
+    splat_files.require_writable(output)
+    field = files.read_field(args.field)
     for flag, used in (("--body", args.body is not None), ("--share", args.share != 1.0)):
         if used:
             raise af.InvalidInput(f"{flag}: splats follow the field itself; a mesh or points are needed")
     splats = af.GaussianSplats.load(args.input)
     moved = with_progress("warp", lambda task: field.apply_to(splats, task=task), args.quiet)
-    outputs.write(output, moved.save)
+    written = {"up": args.up_axis, "name": Path(args.input).stem}
+    outputs.write(output, lambda path: splat_files.write(path, moved, **written))
     summary(args, f"wrote {args.output}")
 
 
@@ -154,11 +159,12 @@ def _extracted(sdf, args, field=None):
 
 def _solve(args, solve, seed, needs_handles):
     """Common part of deform and stylize."""
+    is_scan = af.GaussianSplats.is_file(args.input)
     with Outputs() as outputs:
         places = {
             flag: outputs.check(path, suffixes, flag)
             for flag, path, suffixes in (
-                ("--output", args.output, files.MESH_SUFFIXES),
+                ("--output", args.output, splat_files.SUFFIXES if is_scan else files.MESH_SUFFIXES),
                 ("--surface", args.surface, files.MESH_SUFFIXES),
                 ("--save-field", args.save_field, files.STATE_SUFFIXES),
             )
@@ -171,8 +177,8 @@ def _solve(args, solve, seed, needs_handles):
         source = Source(args)
         if not (source.mesh or source.splats) and "--output" in places:
             raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --surface")
-        if source.splats and "--output" in places and places["--output"].suffix.lower() != ".ply":
-            raise af.InvalidInput(f"--output: {places['--output'].name} is no place for splats; use .ply")
+        if source.splats and "--output" in places:
+            splat_files.require_writable(places["--output"])
         points_on = samples(source, given(args, args.verb, "samples"), seed, args)
         bounds = np.array([points_on.points.min(0), points_on.points.max(0)])
         handles = build_handles(described, bounds) if described or needs_handles else []
