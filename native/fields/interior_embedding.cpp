@@ -33,7 +33,7 @@ constexpr double negligible = -36.0;
 
 /// Where parts of the shape nearly touch: a sample this near, in widths, whose normal is opposite (its cosine
 /// is below), in front of the node or hardly behind it (as a share of the width).
-constexpr double facing_widths = 2.0, facing_cosine = -0.3, facing_behind = 1e-3;
+constexpr double facing_widths = 1.0, facing_cosine = -0.3, facing_behind = 1e-3;
 /// Distance, in widths, up to which it matters what a node sees: a point is within one width of its own
 /// node, and a weight of e^{−9} is little.
 constexpr double sight_widths = 4.0;
