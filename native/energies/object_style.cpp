@@ -9,9 +9,9 @@
 
 #include "core/errors.h"
 #include "distance/hierarchy.h"
-#include "mesh/is_closed.h"
 #include "energies/gauss.h"
 #include "energies/ranges.h"
+#include "mesh/is_closed.h"
 #include "mesh/triangle_mesh.h"
 
 namespace arapfields {

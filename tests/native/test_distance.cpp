@@ -6,10 +6,10 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "distance/hierarchy.h"
-#include "mesh/is_closed.h"
 #include "distance/kernels.h"
 #include "distance/signed_distance.h"
 #include "distance/training_points.h"
+#include "mesh/is_closed.h"
 #include "mesh/sample_mesh.h"
 #include "shapes.h"
 

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "core/parallel.h"
-#include "mesh/is_closed.h"
 #include "distance/triangle_crossings.h"
+#include "mesh/is_closed.h"
 #include "shapes.h"
 
 using namespace arapfields;

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "core/unit_rows.h"
-#include "mesh/is_closed.h"
 #include "distance/triangle_crossings.h"
+#include "mesh/is_closed.h"
 #include "sampling/sample_choice.h"
 
 namespace arapfields {
