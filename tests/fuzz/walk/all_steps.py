@@ -61,6 +61,8 @@ class AllSteps:
             return self.add() if name == "add" else None
         self.source = items[self.rng.integers(len(items))]
         self.old = self.source.name
+        if self.source.library is None:
+            all_scene.small(self.source)  # it may be a result, which has settings of its own
         scenes.activate(self.source)
         return getattr(self, name)()
 
