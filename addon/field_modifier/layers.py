@@ -88,10 +88,16 @@ def make_way(source, kind):
     return Way(gone=tuple(gone))
 
 
-def make_way_for_handle(source):
-    """make_way() before a handle is made, which holds the visible shape; not while a session is live."""
-    if not settings_of(source).live_kind:
-        make_way(source, "DEFORM")
+@contextlib.contextmanager
+def way_for_handle(context, source):
+    """Context manager: make_way() for a new handle, which holds the visible shape; put back after an error.
+    Not while a session is live."""
+    way = NOTHING if settings_of(source).live_kind else make_way(source, "DEFORM")
+    try:
+        yield
+    except Exception:
+        put_back(context, source, way)
+        raise
 
 
 def put_back(context, source, way):
