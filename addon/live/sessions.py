@@ -153,6 +153,7 @@ def end(context, source, keep=False):
     if keep:
         return session.display.keep(context, source, session.kind)
     session.take_away(source)
+    layers.uncover(source, baked=True)
     return None
 
 
