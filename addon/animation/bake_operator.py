@@ -90,8 +90,7 @@ class BakeOperator(JobOperator):
             try:
                 if reason is not None:
                     raise reason
-                if kind == "DEFORM":
-                    layers.make_way(source, kind)
+                if kind == "DEFORM" and layers.make_way(source, kind).is_covered:
                     self.covered.append(ObjectReference(source))
                 bake = bakes_of(source, kind, chosen)
                 yield from with_progress(job, bake.reader.read_setup(context), source.name)

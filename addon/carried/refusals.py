@@ -2,7 +2,7 @@
 """UserErrors that say why an object is not carried."""
 
 from ..blender.evaluation import with_ancestors
-from ..blender.modifier_stack import handle_rigs
+from ..blender.modifier_stack import handle_rigs, is_posing
 from ..blender.object_references import in_scene, settings_of
 from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError
@@ -11,6 +11,12 @@ from .world_matrices import constrained_to
 
 BINDING = {"LATTICE": "object", "CURVE": "object", "HOOK": "object"}  # modifiers that follow another object
 BINDING |= {"MESH_DEFORM": "object", "SURFACE_DEFORM": "target"}
+
+
+def bound_to(item):
+    """The objects that shown modifiers of an object have it follow, None among them."""
+    shown = [modifier for modifier in item.modifiers if modifier.show_viewport]
+    return [getattr(modifier, BINDING[modifier.type]) for modifier in shown if modifier.type in BINDING]
 
 
 def of_entry(source, entry):
@@ -44,6 +50,8 @@ def of_item(source, item):
     rigs = handle_rigs(source)
     if item in rigs:
         return UserError("The bones of {name} are handles of {source}", item, source=source.name)
+    if moves(item, source):
+        return UserError("{name} moves {source} already; it is not carried", item, source=source.name)
     if constrained_to(item, [*rigs, *above_field(source)]):
         return UserError("{name} follows the armature by a constraint; it is not carried", item)
     return moves_anyway(source, item)
@@ -64,11 +72,17 @@ def moves_anyway(source, item):
     for parent in with_ancestors(item.parent):
         if parent in carried and is_moved_whole(source, parent):
             return moves_with(item, parent)
-    for modifier in item.modifiers:
-        target = getattr(modifier, BINDING[modifier.type]) if modifier.type in BINDING else None
-        if modifier.show_viewport and target is not None and target in [source, *carried]:
+    for target in bound_to(item):
+        if target is not None and target in [source, *carried]:
             return moves_with(item, target)
     return None
+
+
+def moves(item, source):
+    """Whether an object moves the source: what the field does to it would reach the source once more."""
+    posing = [one.object for one in source.modifiers if is_posing(source, one) and one.show_viewport]
+    above = [*with_ancestors(source.parent), *posing, *bound_to(source)]
+    return item in above or constrained_to(source, [item])
 
 
 def is_moved_whole(source, item):

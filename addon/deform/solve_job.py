@@ -94,7 +94,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
             preview.hand_over()
         owner = surface.reference.get()
         if result != "NEW":
-            operator.gone = tuple(one for one in operator.gone if one[0].uid != surface.reference.uid)
+            operator.ways = tuple(one for one in operator.ways if one[0].uid != surface.reference.uid)
         item = placement.place_result(bpy.context, owner, kind, output, result, solved, placed.local)
         if preview is not None:
             preview.keep()
@@ -118,7 +118,7 @@ class SolveOperator(JobOperator):
 
     ended_live = False  # whether the operator has ended live mode
 
-    gone = ()  # (ObjectReference, motions removed by make_way()) of sources without a result yet
+    ways = ()  # (ObjectReference, Way by make_way()) of sources without a result yet
 
     @classmethod
     def refuses(cls, source):
@@ -133,18 +133,18 @@ class SolveOperator(JobOperator):
         """Ends live mode after all checks, and makes the result that the run acts on a layer."""
         output, result = destination(settings_of(source), self)
         self.ended_live |= end_for_job(context, source, output, result)
-        if any(reference.uid == source.session_uid for reference, _ in self.gone):
+        if any(reference.uid == source.session_uid for reference, _ in self.ways):
             return
         reason = None if result == "NEW" else layers.replaced(source, kind)
         self.warnings += [translated(reason)] if reason else []
-        self.gone = (*self.gone, (ObjectReference(source), layers.make_way(source, kind)))
+        self.ways = (*self.ways, (ObjectReference(source), layers.make_way(source, kind)))
 
     def clear_up(self, job):
         """Restores the earlier results of sources whose job has failed."""
-        for reference, gone in self.gone:
+        for reference, way in self.ways:
             source = reference.find()
             if source is not None:
-                layers.put_back(bpy.context, source, gone)
+                layers.put_back(bpy.context, source, way)
 
     def in_place(self, source):
         return placement.in_place(*destination(settings_of(source), self))

@@ -7,6 +7,7 @@ When the field's modifier is removed, the last layer becomes the field's modifie
 
 import contextlib
 from itertools import count
+from typing import NamedTuple
 
 from ..blender import mesh_arrays, modifier_stack, undo_steps
 from ..blender.object_references import settings_of
@@ -59,12 +60,23 @@ def replaced(source, kind):
     return UserError("{name}: this replaces the result of {operation}", source, operation=operation)
 
 
+class Way(NamedTuple):
+    """What make_way() has changed."""
+
+    is_covered: bool = False  # the field's modifier has become a layer
+    gone: tuple = ()  # (motion, kind, Factor) of each that was removed, None where a layer had none above
+
+
+NOTHING = Way()
+
+
 def make_way(source, kind):
-    """Called before a run reads its shape: makes the result that it acts on a layer, and removes those above.
-    Returns the removed ones for `put_back`, if the run fails."""
+    """Called before a run reads its shape: makes the result that it acts on a layer, or removes those above.
+    Returns the Way, for put_back() if the run fails."""
     gone = []
     if stays_below(source, kind):
         cover(source)
+        return Way(is_covered=True)
     for layer in reversed(modifier_stack.layers(source)):
         if ORDER[kind_in(layer)] < ORDER[kind]:
             break
@@ -73,19 +85,25 @@ def make_way(source, kind):
         with undo_steps.unused_kept():  # put_back() may take them again, without a step of undo
             motion.discard(source)
             uncover(source, baked=True)
-    return gone
+    return Way(gone=tuple(gone))
 
 
-def make_way_for_handle(source):
-    """make_way() before a handle is made, which holds the visible shape; not while a session is live."""
-    if not settings_of(source).live_kind:
-        make_way(source, "DEFORM")
+@contextlib.contextmanager
+def way_for_handle(context, source):
+    """Context manager: make_way() for a new handle, which holds the visible shape; put back after an error.
+    Not while a session is live."""
+    way = NOTHING if settings_of(source).live_kind else make_way(source, "DEFORM")
+    try:
+        yield
+    except Exception:
+        put_back(context, source, way)
+        raise
 
 
-def put_back(context, source, gone):
+def put_back(context, source, way):
     """Restores layers and the motion on top of them after a run that failed, and a bake that played."""
     playing = cache_modifier.suspend(source)
-    for one in reversed(gone):
+    for one in reversed(way.gone):
         if not can_stay(source):
             break
         cover(source)
@@ -95,7 +113,7 @@ def put_back(context, source, gone):
                 inputs.put(motion.bind(context, source), "Factor", factor)
                 motion.write(source, moved)
                 settings_of(source).moved_by = by
-    if not gone:
+    if way.is_covered:
         uncover(source, baked=True)
     if playing:
         cache_modifier.set_playing(source, True)

@@ -16,7 +16,7 @@ from ..blender.object_references import settings_of
 from ..blender.point_data import points_of
 from ..blender.removal import remove_mesh_object, remove_node_modifier, remove_unused_group
 from ..core.errors import UserError
-from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS
+from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, SHAPE_OF
 from . import armatures, cache_modifier, inputs, masks, node_group
 
 written = set()  # session_uids of objects that the add-on itself has moved since the last depsgraph update
@@ -131,10 +131,13 @@ def take_helper(source, modifier):
 def fill_helper(context, source, modifier):
     """Gives the helper the vertices and faces at the modifier's place."""
     shown = modifier_stack.mesh_copy(context, source, in_place=True)
+    mesh = inputs.get(modifier, "Offsets").data
     try:
-        mesh_arrays.take_geometry(inputs.get(modifier, "Offsets").data, shown)
+        mesh_arrays.take_geometry(mesh, shown)
     finally:
         bpy.data.meshes.remove(shown)
+    if OFFSETS not in mesh.attributes:
+        unmark(mesh)
 
 
 def leave_helper(modifier, live=False):
@@ -146,7 +149,7 @@ def leave_helper(modifier, live=False):
         if len(helper.data.vertices):
             inputs.put(modifier, "Offsets", None)
     elif live or undo_steps.keeps_unused:
-        helper.data.clear_geometry()
+        empty(helper)
     else:
         inputs.put(modifier, "Offsets", None)
         discard_helper(helper)
@@ -164,8 +167,19 @@ def unused_helper(source):
     helper = bpy.data.objects.get(f"{source.name}{HELPER_SUFFIX}")
     if helper is None or helper.type != "MESH" or helper.library is not None or users_of(helper):
         return None
-    helper.data.clear_geometry()
+    empty(helper)
     return helper
+
+
+def empty(helper):
+    """Takes the points and offsets away, and the mark of the shape that these were."""
+    helper.data.clear_geometry()
+    unmark(helper.data)
+
+
+def unmark(mesh):
+    if SHAPE_OF in mesh:
+        del mesh[SHAPE_OF]
 
 
 def users_of(helper):

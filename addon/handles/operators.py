@@ -76,10 +76,10 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
         if self.kind == "GROUP" and not group:
             raise vertex_groups.none_chosen(source)
         selected = [item for item in context.selected_objects if item.type == "EMPTY"]
-        layers.make_way_for_handle(source)
         is_new = not selected or self.place != "AUTO" or source.mode == "EDIT"
-        if is_new:
-            selected = [empties.new_empty(context, source, self.kind, group, self.place)]
+        with layers.way_for_handle(context, source):
+            if is_new:
+                selected = [empties.new_empty(context, source, self.kind, group, self.place)]
         others = {settings_of(empty).handle_of for empty in selected} - {None, source}
         for empty in selected:
             if naming.is_blenders_own(empty):
@@ -106,9 +106,9 @@ class ARAPFIELDS_OT_add_bones(HandleOperator, bpy.types.Operator):
 
     def change(self, context, source):
         rig = bones.armature_of(context, source)
-        layers.make_way_for_handle(source)
-        groups = bones.holding_groups(context, source)
-        names = bones.chosen(rig, self.bones, groups)
+        with layers.way_for_handle(context, source):
+            groups = bones.holding_groups(context, source)
+            names = bones.chosen(rig, self.bones, groups)
         for name in names:
             bones.add(source, rig, name, groups)
         is_asked = self.bones == "SELECTED"

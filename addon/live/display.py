@@ -3,6 +3,7 @@
 
 from typing import Any, NamedTuple
 
+from ..field_modifier.layers import Way
 from .live_modifier import LiveModifier
 from .live_object import LiveObject
 
@@ -14,7 +15,7 @@ class Former(NamedTuple):
     display: Any
     carried: dict  # what carried objects had before
     keeps_shape: bool
-    gone: list  # what layers.make_way() has removed
+    way: Way  # what layers.make_way() has changed
 
 
 def display_of(context, source, surface, earlier):

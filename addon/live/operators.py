@@ -5,7 +5,7 @@ from ..blender.language import translated
 from ..blender.object_references import source_of
 from ..blender.property_definitions import choice
 from ..blender.source_operator import ReportingOperator
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.runtime import jobs
 from ..core.settings.choices import LIVE_KINDS
 from ..handles import empties
@@ -42,23 +42,26 @@ class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
         if sessions.is_live(source, self.kind):
             sessions.end(context, source)
             return {"FINISHED"}
+        earlier = sessions.live.get(source.session_uid)
         try:
-            if self.kind == "DEFORM" and not empties.used(source):
-                raise UserError("{name} has no handle; add one in the panel's Handles section", source)
-            is_style = self.kind == "STYLIZE"
-            reason = style_settings.refusal(source) if is_style else frozen(empties.used(source))
-            if reason is not None:
-                raise reason
-            context.view_layer.update()
-            sessions.begin(context, source, self.kind)
+            self.start(context, source, wait)
         except (UserError, ValueError) as error:
+            if earlier is not None and not sessions.is_live(source):
+                sessions.go_back(context, source, earlier.former, earlier.kind)
             return self.refuse(error)
-        if wait:
-            sessions.update(context, wait)
-            if not sessions.is_live(source):
-                self.report({"ERROR"}, jobs.messages()[-1][1])
-                return {"CANCELLED"}
         return {"FINISHED"}
+
+    def start(self, context, source, wait):
+        if self.kind == "DEFORM" and not empties.used(source):
+            raise UserError("{name} has no handle; add one in the panel's Handles section", source)
+        is_style = self.kind == "STYLIZE"
+        refuse(style_settings.refusal(source) if is_style else frozen(empties.used(source)))
+        context.view_layer.update()
+        sessions.begin(context, source, self.kind)
+        if wait:
+            sessions.update_one(context, source.session_uid, wait)
+        if not sessions.is_live(source):
+            raise UserError("{error}", error=jobs.messages()[-1][1])
 
 
 class ARAPFIELDS_OT_live_keep(ReportingOperator, bpy.types.Operator):

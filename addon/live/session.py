@@ -33,16 +33,16 @@ class Session:
     """Reads its source in the constructor, on the main thread; the worker solves.
 
     `earlier`: Former of the source's last session, whose display is reused. `keeps_shape`: the shape is the
-    user's work and stays when live mode ends. `gone`: what layers.make_way() has removed for the session.
+    user's work and stays when live mode ends. `way`: what layers.make_way() has changed for the session.
 
     If the shape in the file belongs to the current request (stored.py), as after undo, it stays bit for bit.
     Otherwise it was stored before the solve had ended, and the request is solved.
     """
 
-    def __init__(self, context, source, kind="DEFORM", earlier=None, keeps_shape=False, gone=()):
+    def __init__(self, context, source, kind="DEFORM", earlier=None, keeps_shape=False, way=layers.NOTHING):
         settings = settings_of(source)
         in_place = placement.in_place(settings.output, settings.result)
-        self.keeps_shape, self.gone, self.kind = keeps_shape, gone, kind
+        self.keeps_shape, self.way, self.kind = keeps_shape, way, kind
         self.layout = layout_of(source, kind, context.scene)
         self.reader = SourceReader(context, source, kind, in_place)
         self.edits, self.solver, self.worker = EditWatch(self.reader), LiveSolver(self.reader), None
@@ -106,7 +106,7 @@ class Session:
 
     @property
     def former(self):
-        return Former(self.source.uid, self.display, self.carrying.before, self.keeps_shape, self.gone)
+        return Former(self.source.uid, self.display, self.carrying.before, self.keeps_shape, self.way)
 
     def stop(self):
         self._reading.close()
@@ -245,4 +245,4 @@ class Session:
         self.display.take_away(source)
         self.carrying.take_away()
         if source is not None:
-            layers.put_back(bpy.context, source, self.gone)
+            layers.put_back(bpy.context, source, self.way)

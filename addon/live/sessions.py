@@ -70,10 +70,10 @@ def is_live(source, kind=None):
     return session is not None and kind in (None, session.kind)
 
 
-def begin(context, source, kind="DEFORM", keeps_shape=False):
+def begin(context, source, kind="DEFORM", keeps_shape=False, way=None):
     """Makes the source live, or raises UserError. The shape appears once the worker has solved it.
 
-    `keeps_shape`: what is shown stays when live mode ends.
+    `keeps_shape`: what is shown stays when live mode ends. `way`: of layers.make_way(), if that is done.
     """
     live.shown_scene.follow(context, live.values())
     end_for_kind(context, source, kind)
@@ -84,9 +84,10 @@ def begin(context, source, kind="DEFORM", keeps_shape=False):
     live.paused.discard(source.session_uid)
     if former is None or settings_of(source).live_kind != kind:
         settings_of(source).held = ""
-    gone = layers.make_way(source, kind) if former is None else former.gone
+    if way is None:
+        way = layers.make_way(source, kind) if former is None else former.way
     try:
-        session = Session(context, source, kind, former, keeps_shape, gone)
+        session = Session(context, source, kind, former, keeps_shape, way)
         session.advance()  # a small mesh is read at once
         warn(session)
     except UserError:
@@ -96,11 +97,12 @@ def begin(context, source, kind="DEFORM", keeps_shape=False):
         elif session or earlier:
             take_away(session or earlier)
         else:
-            layers.put_back(context, source, gone)
+            layers.put_back(context, source, way)
         raise
     finally:
         live.begun = None
     session.is_back = returned is not None
+    session.is_held = earlier is not None and earlier.is_held
     if session.display.in_place:
         layers.note(source, kind)
     live[source.session_uid] = session
@@ -122,9 +124,14 @@ def end_for_kind(context, source, kind):
 
 
 def go_back(context, source, former, kind):
-    """Restarts the session that end_for_kind() has ended."""
+    """Restarts a session that end_for_kind() or one of another kind has ended."""
+    if not former.display.is_there():
+        former = former._replace(display=None)
     live.returning[source.session_uid] = former
-    begin(context, source, kind, former.keeps_shape)
+    try:
+        begin(context, source, kind, former.keeps_shape)
+    except UserError as error:
+        jobs.add_message("ERROR", about(source.name, error))
 
 
 def follows_handles(source):
@@ -146,6 +153,7 @@ def end(context, source, keep=False):
     if keep:
         return session.display.keep(context, source, session.kind)
     session.take_away(source)
+    layers.uncover(source, baked=True)
     return None
 
 
@@ -186,23 +194,26 @@ def update(context, wait=0.0, refined=False):
     """Updates every session once; waits at most `wait` seconds for each shape."""
     return_all(context)
     live.shown_scene.follow(context, live.values())
-    has_ended = False
-    for uid, session in list(live.items()):
-        try:
-            session.update(context)
-            if wait:
-                session.wait(wait, refined)
-            session.show()
-            warn(session)
-        except SourceChanged:
-            with undo_steps.between():
-                has_ended |= not restart(context, uid, session)
-        except (UserError, ValueError, ReferenceError) as error:
-            has_ended |= end_with_error(uid, session, error)
-        else:
-            session.is_back = False
-    if has_ended:
+    if any([update_one(context, uid, wait, refined) for uid in list(live)]):
         undo_steps.push("Live")
+
+
+def update_one(context, uid, wait=0.0, refined=False):
+    """The same for one session, without a step of undo; returns whether its end has changed the scene."""
+    session = live[uid]
+    try:
+        session.update(context)
+        if wait:
+            session.wait(wait, refined)
+        session.show()
+        warn(session)
+    except SourceChanged:
+        with undo_steps.between():
+            return not restart(context, uid, session)
+    except (UserError, ValueError, ReferenceError) as error:
+        return end_with_error(uid, session, error)
+    session.is_back = False
+    return False
 
 
 def settle(context, uid):

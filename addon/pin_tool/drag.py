@@ -16,10 +16,10 @@ TRANSFORMS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axi
 
 
 class Snapshot:
-    """The state that a drag changes, read before the pin is placed."""
+    """The state that a drag changes, read before the pin is placed. `ended`, `way`: by make_way()."""
 
-    def __init__(self, context, source, ended=None):
-        self.ended = ended  # result of make_way()
+    def __init__(self, context, source, ended=None, way=None):
+        self.ended, self.way = ended, way
         settings, layer = settings_of(source), context.view_layer
         self.source, session = ObjectReference(source), sessions.live.get(source.session_uid)
         self.live = None if session is None else (session.kind, session.keeps_shape)
@@ -63,7 +63,7 @@ class Drag:
         self.reach, self.kind = pins.entry_of(empty).reach, pins.entry_of(empty).kind
         self.values = {name: tuple(getattr(empty, name)) for name in TRANSFORMS}
         source = before.source.get()
-        begin_live(context, source)
+        begin_live(context, source, before.way)
         sessions.live[source.session_uid].keeps_shape = True
 
     def move(self, context, location):
@@ -149,10 +149,10 @@ def insert_keys(context, empty):
             empty.keyframe_insert(path)
 
 
-def begin_live(context, source):
+def begin_live(context, source, way=None):
     """Makes a source live, unless its shape follows handles already."""
     if not sessions.follows_handles(source):
-        sessions.begin(context, source, kind_of(source), keeps_shape=True)
+        sessions.begin(context, source, kind_of(source), keeps_shape=True, way=way)
 
 
 def kind_of(source):
@@ -162,35 +162,33 @@ def kind_of(source):
 
 
 def make_way(context, source):
-    """layers.make_way() before a drag. Returns (Former, kind) of a session that it has ended, or None."""
-    ended = None
+    """layers.make_way() before a drag. Returns (Former, kind) of the session that it has ended, and the Way;
+    None for each that is not there."""
+    ended = way = None
     if not sessions.follows_handles(source):
         ended = sessions.end_for_kind(context, source, kind_of(source))
         reason = layers.replaced(source, kind_of(source))
         if reason is not None:
             jobs.add_message("WARNING", translated(reason))
-        layers.make_way(source, kind_of(source))
-    return ended
+        way = layers.make_way(source, kind_of(source))
+    return ended, way
 
 
 def of_entry(context, source, entry):
     """A drag of an existing handle."""
-    ended = make_way(context, source)
-    before = Snapshot(context, source, ended)
+    before = Snapshot(context, source, *make_way(context, source))
     pins.select(context, entry.empty)
     return Drag(context, before, entry.empty)
 
 
 def of_new_pin(context, source, location, radius, **further):
     """A drag of a new pin."""
-    ended = make_way(context, source)
-    before = Snapshot(context, source, ended)
+    before = Snapshot(context, source, *make_way(context, source))
     entry = pins.place(context, source, location, radius, **further)
     try:
         return Drag(context, before, entry.empty, is_new=True)
     except Exception:
         pins.discard(source, entry.empty)
         settings_of(source).keep_rest = before.keep_rest
-        layers.uncover(source)
         before.restore_selection(context)
         raise

@@ -93,9 +93,9 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
     error = refusal(source)
     if error is not None:
         raise error
-    layers.make_way_for_handle(source)
     settings, is_first = settings_of(source), not empties.used(source)
-    place = places.find(context, source, location, radius, face, face_count)
+    with layers.way_for_handle(context, source):
+        place = places.find(context, source, location, radius, face, face_count)
     if face is not None and np.linalg.norm(place.now - location) > radius:
         warn_of_moves(source)
     if is_first:

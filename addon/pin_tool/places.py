@@ -11,6 +11,7 @@ from mathutils import Vector
 from mathutils.geometry import barycentric_transform, closest_point_on_tri
 
 from ..blender import mesh_arrays, modifier_stack, point_data
+from ..core.errors import UserError
 from ..core.geometry.rotations import best_rotation
 from ..core.geometry.spaces import transform
 from ..handles.empties import matrix_of
@@ -42,6 +43,8 @@ def find(context, source, location, radius, face=None, face_count=None):
         now = transform(world, mesh_arrays.positions(mesh))
         rest = now if rest is None else rest
         faces = point_data.face_count(mesh)
+        if not len(now):
+            raise UserError("{name} has no vertices to hold a pin", source)
         if not faces:
             nearest = int(((now - location) ** 2).sum(axis=1).argmin())
             at_rest, moved = rest[nearest], now[nearest]

@@ -41,6 +41,33 @@ def test_what_moves_anyway_is_named_and_left():
     assert len(bar.arapfields.carried) == 2
 
 
+@pytest.mark.parametrize("kind", ["ARMATURE", "LATTICE", "parent", "grandparent", "constraint"])
+def test_what_moves_the_source_is_not_carried_by_it(kind):
+    """It would move the source, whose field moves it, without an end."""
+    bar, _ = body()
+    item = rider(kind if kind.isupper() else "EMPTY")
+    if kind in ("ARMATURE", "LATTICE"):
+        modifier = bar.modifiers.new(kind, kind)
+        modifier.object = item
+    elif kind == "constraint":
+        bar.constraints.new("CHILD_OF").target = item
+    else:
+        bar.parent = item if kind == "parent" else link("Between", None)
+        bar.parent.parent = None if kind == "parent" else item
+    bpy.context.view_layer.update()
+    scenes.activate(item, bar)
+    with pytest.raises(RuntimeError, match=f"{item.name} moves Bar already"):
+        bpy.ops.arapfields.carry()
+    assert not bar.arapfields.carried
+    if kind in ("ARMATURE", "LATTICE"):
+        modifier.show_viewport = False
+        assert bpy.ops.arapfields.carry() == {"FINISHED"}
+        modifier.show_viewport = True
+        scenes.activate(bar)
+        assert bpy.ops.arapfields.live() == {"FINISHED"}
+        assert [text for _, text in jobs.messages() if f"{item.name} moves Bar already" in text]
+
+
 def test_bad_ones_are_named_and_the_rest_goes_on():
     bar, moving = body()
     good = rider("MESH")

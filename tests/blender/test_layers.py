@@ -51,6 +51,25 @@ def test_deform_acts_on_the_styled_shape(stack):
     assert structure(bar)[:4] == before[:4]
 
 
+@pytest.mark.parametrize(
+    "run, given", [("deform", {"field": "radial"}), ("live", {}), ("bake", {"format": "KEYS"})]
+)
+def test_a_refused_run_leaves_a_layer_that_was_there_before(run, given):
+    """A handle has made the style a layer; it holds nothing, so the run fails, and puts nothing back."""
+    bar, shape, _ = styled()
+    far = scenes.cube_empty((9, 0, 0), (0.3, 0.6, 0.6), "Far")
+    bpy.context.view_layer.update()
+    scenes.activate(far, bar)
+    assert bpy.ops.arapfields.add_handle() == {"FINISHED"}
+    scenes.activate(bar)
+    before = structure(bar)[:4]
+    assert layers.LAYER_GROUP in bar.modifiers[0].node_group
+    with pytest.raises(RuntimeError, match="No part of the surface lies in"):
+        getattr(bpy.ops.arapfields, run)(**given)
+    bpy.context.view_layer.update()
+    assert structure(bar)[:4] == before and np.array_equal(scenes.world_points(bar), shape)
+
+
 def test_a_drag_over_a_style_is_cancelled_undone_and_deleted_bit_for_bit():
     setup.SAMPLES = 500
     styled()

@@ -10,6 +10,7 @@ if IN_BLENDER:
     from support.blender import scenes, stages
     from support.blender.live import step
 
+    from addon.blender import undo_steps
     from addon.core.runtime import jobs
     from addon.core.runtime.coroutines import run_to_completion
     from addon.live import sessions
@@ -123,3 +124,38 @@ def test_pins_are_dragged_again_after_deform():
     bpy.ops.ed.undo()
     bpy.context.view_layer.update()
     assert np.abs(scenes.world_points(bpy.data.objects["Bar"]) - live).max() < 1e-6
+
+
+def shown_meshes():
+    meshes = [item for item in bpy.context.scene.objects if item.type == "MESH"]
+    return {item.name: scenes.world_points(item) for item in meshes}
+
+
+@pytest.mark.parametrize("result", ["MODIFIER", "NEW"])
+@pytest.mark.parametrize("fails", ["at once", "later"])
+def test_a_refused_press_of_another_kind_leaves_live_mode(result, fails):
+    """Live Deform is refused while Live Stylize is on: that goes on, with its shape and no step of undo."""
+    bar = scenes.bar()
+    bar.arapfields.result = result
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
+    step(refined=True)
+    if fails == "later":  # when the solver looks for what the handle holds
+        far = scenes.cube_empty((9.0, 0.0, 0.0), (0.3, 0.6, 0.6))
+        bpy.context.view_layer.update()
+        scenes.activate(far, bar)
+        bpy.ops.arapfields.add_handle()
+        scenes.activate(bar)
+    shown = {
+        item.name: scenes.world_points(item) for item in bpy.context.scene.objects if item.type == "MESH"
+    }
+    pushed = undo_steps.pushed
+    with pytest.raises(RuntimeError, match="no handle" if fails == "at once" else "No part of the surface"):
+        bpy.ops.arapfields.live(kind="DEFORM")
+    step(refined=True)
+    assert sessions.is_live(bar, "STYLIZE") and bar.arapfields.live_kind == "STYLIZE"
+    assert undo_steps.pushed == pushed
+    now = shown_meshes()
+    assert now.keys() == shown.keys() and len(now) == (1 if result == "MODIFIER" else 2)
+    for name, points in shown.items():
+        assert np.array_equal(now[name], points), name

@@ -74,3 +74,22 @@ def test_a_drag_after_an_undone_one_starts_from_what_is_shown():
     dragged.move(bpy.context, (1.0, 0.0, 0.5 + 1e-3))
     step()
     assert 0 < np.abs(scenes.world_points(bar) - shown).max() < 0.02
+
+
+def test_an_anchor_in_a_live_style_that_waits_for_a_handle_holds_the_shape():
+    """The solver is set up anew for the first handle; the shape that is shown stays until a handle moves."""
+    scenes.bar()
+    bar = bpy.data.objects["Bar"]
+    assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
+    step(refined=True)
+    bar.arapfields.stylize.use_handles = True
+    step(refined=True)
+    shown = scenes.world_points(bar)
+    dragged = drag.of_new_pin(bpy.context, bar, (1.0, 0.0, 0.25), 0.2, anchor=True)
+    dragged.end(bpy.context)
+    step(refined=True)
+    assert sessions.is_live(bar, "STYLIZE") and np.array_equal(scenes.world_points(bar), shown)
+    dragged = drag.of_entry(bpy.context, bar, bar.arapfields.handles[0])
+    dragged.move(bpy.context, (1.0, 0.0, 0.6))
+    step()
+    assert np.abs(scenes.world_points(bar) - shown).max() > 0.1

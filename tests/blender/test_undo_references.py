@@ -132,3 +132,26 @@ def test_a_live_object_of_its_own_comes_back_by_undo():
         assert np.array_equal(scenes.world_points(bpy.data.objects["Bar2_live"]), shown)
     finally:
         end()
+
+
+def test_a_shape_comes_back_by_undo_after_its_helper_was_emptied():
+    """Without the modifier the offsets lie on the mesh, and the helper's own are gone, which no step has."""
+    end = world.few_centers()
+    try:
+        build()
+        bar = bpy.data.objects["Bar0"]
+        bar.modifiers["Mirror"].show_viewport = False
+        take("live", bar)
+        world.settle()
+        bpy.ops.ed.undo_push(message="live")
+        world.settle()
+        shown = scenes.world_points(bar)
+        bar.modifiers.remove(bar.modifiers["Mirror"])
+        bpy.ops.ed.undo_push(message="removed")
+        world.settle()
+        bpy.ops.ed.undo()
+        world.settle()
+        bar = bpy.data.objects["Bar0"]
+        assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
+    finally:
+        end()

@@ -27,6 +27,10 @@
 #include "solve/radial/radial_solver.h"
 #include "solve/stylize.h"
 
+#if defined(__SANITIZE_ADDRESS__) && (defined(NDEBUG) || defined(EIGEN_NO_DEBUG))
+#error "Sanitized builds have the assertions of Eigen on"
+#endif
+
 using namespace arapfields;
 
 namespace {

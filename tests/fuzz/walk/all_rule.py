@@ -62,10 +62,16 @@ class All:
             between = [None] * (undo_steps.pushed - pushed)  # where live mode has ended
             self.history = [*self.history, *between, all_scene.picture()][-40:]
             self.position = len(self.history) - 1
+            if name == "register":  # live mode ends with the extension, and does not come back by undo
+                self.history = [None if is_live(picture) else picture for picture in self.history]
             if name in KEEPS_POINTS and not may_move:
                 require_points(points, all_scene.rest(), said)
         require_tidy()
         return f"{self.steps.old}: {said}"
+
+
+def is_live(picture):
+    return picture is not None and any(seen["live"] for seen in picture.values())
 
 
 def require_same(expected, found, said):

@@ -61,6 +61,8 @@ class AllSteps:
             return self.add() if name == "add" else None
         self.source = items[self.rng.integers(len(items))]
         self.old = self.source.name
+        if self.source.library is None:
+            all_scene.small(self.source)  # it may be a result, which has settings of its own
         scenes.activate(self.source)
         return getattr(self, name)()
 
@@ -419,8 +421,9 @@ class AllSteps:
         return f"{bar.name} added"
 
     def link(self):
-        """Links or appends a copy of an object from another file."""
-        if self.source.library or len(bpy.context.view_layer.objects) > 30:
+        """Links or appends a copy of an object from another file; of none with a parent, which Blender's undo
+        loses, even without the extension."""
+        if self.source.library or self.source.parent or len(bpy.context.view_layer.objects) > 30:
             return None
         path, name = f"{self.folder}/other{self.rng.integers(1 << 30)}.blend", self.source.name
         bpy.data.libraries.write(path, {self.source})

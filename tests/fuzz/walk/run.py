@@ -15,7 +15,7 @@ from pathlib import Path
 from .plan import Walk
 
 ROOT = Path(__file__).resolve().parents[3]
-HANG = 120.0  # seconds that a step may take
+HANG = 300.0  # seconds that a step may take where others need the processors, too
 
 
 @dataclass

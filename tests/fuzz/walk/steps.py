@@ -186,7 +186,7 @@ class Steps:
     def wrap(self):
         others = [item for item in world.sources() if item != self.source]
         self.settings.wrap.onto = others[self.rng.integers(len(others))]
-        bpy.ops.arapfields.wrap(samples=400, iterations=3)
+        bpy.ops.arapfields.wrap(samples=400, iterations=3, centers=20, stages=1)
         return "wrap"
 
     def mode(self):
