@@ -17,8 +17,14 @@ from ..surface.source_surface import SourceSurface
 SAMPLES = 6000
 # Panel options that are weights of energy terms.
 ENERGY = {
-    *("bending", "bending_unit", "barrier", "handle_weight", "symmetry", "rigidity", "keep_stance"),
-    *("locality", "locality_limit", "locality_smoothing"),
+    "bending",
+    "bending_unit",
+    "barrier",
+    "handle_weight",
+    "symmetry",
+    "rigidity",
+    "keep_stance",
+    "locality",
 }
 
 
