@@ -72,7 +72,7 @@ TallMatrix<float> RadialState::factor(double inertia) {
 }
 
 Locality RadialState::locality() {
-  if (!handles.any() || style.any() || dynamics.has_mass() || contact.itself()) return Locality::none();
+  if (!handles.any() || style.any() || dynamics.has_mass() || contact.any()) return Locality::none();
   Locality result;
   result.options = problem.options.locality;
   if (!result.acts()) return result;

@@ -62,7 +62,7 @@ struct RadialState {
   void precondition(double inertia);
   /// The terms of jets of the current parts, for the energy samples.
   JetTermList jet_terms(std::optional<Body<double>> body);
-  /// What keeps the energy samples in place; a style, a mass, and parts that may meet go without.
+  /// What keeps the energy samples in place; a style, a mass, and contact go without.
   Locality locality();
   /// The objective of the current parts, without inertia.
   template <class Scalar>
