@@ -89,6 +89,7 @@ class FrameSolver:
             # The native energy has stretch and bend with weight 1: all others are relative to it.
             rigidity = max(options.pop("rigidity"), LEAST_RIGIDITY)
             options["gauss_weight"] = af.LiveOptions().gauss_weight
+            options["locality"] = 0.0  # as stylize()
             for name in ("barrier", "gauss_weight", "keep_stance", "handle_weight"):
                 options[name] /= rigidity
         options["interior"] = setup.kind == "DEFORM" or bool(handles)  # a style alone acts everywhere alike

@@ -16,7 +16,16 @@ from ..surface.source_surface import SourceSurface
 
 SAMPLES = 6000
 # Panel options that are weights of energy terms.
-ENERGY = {"bending", "bending_unit", "barrier", "handle_weight", "symmetry", "rigidity", "keep_stance"}
+ENERGY = {
+    "bending",
+    "bending_unit",
+    "barrier",
+    "handle_weight",
+    "symmetry",
+    "rigidity",
+    "keep_stance",
+    "locality",
+}
 
 
 @dataclass(frozen=True)

@@ -200,7 +200,7 @@ It fits any LiveDeformer with the same samples, options and number of handles.)"
   py::class_<Live>(module, "LiveDeformer", R"(
 Deforms a surface at interactive rates: when handles move, solve() continues from the last shape.
 
-The energy is that of deform (stretch, bend, handles), or with a style that of stylize, over a radial field.
+The energy is that of deform (stretch, bend, handles, locality), or with a style that of stylize, over a radial field.
 L-BFGS preconditioned with the factored stiffness of the rest surface minimises it. Any thread
 may call it: one at a time works, the others wait.)")
       .def(py::init([](const SurfaceSamples& samples, const HandlesArgument& handles, LiveOptions options,

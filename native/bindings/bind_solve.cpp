@@ -136,8 +136,8 @@ samples and the `handles` (CuboidHandle, PointHandle, RegionHandle). Source: sec
 divides it by 3.
 
 `energies` are functions of Jets that return an EnergyValue; each joins the loss with weight 1. `callback` is
-called with an Iteration after each iteration, whose terms are those of stretch, bend, barrier, handles,
-invertibility and energies[i] that are in use. StopIteration in it ends the solve with the field reached so
+called with an Iteration after each iteration, whose terms are those of stretch, bend, barrier, locality,
+handles, invertibility and energies[i] that are in use. StopIteration in it ends the solve with the field reached so
 far; any other exception propagates.
 
 field.report is a SolveReport. Raises InvalidInput, Cancelled and Diverged, whose attribute `last_good` is the

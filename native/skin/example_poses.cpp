@@ -15,6 +15,7 @@ constexpr double largest_angle = 40.0 * std::numbers::pi / 180.0;
 
 LiveOptions solver_options(const SkinOptions& options) {
   LiveOptions result;
+  result.locality.locality = 0.0;  // a joint bends all that is near it
   result.seed = options.seed;
   result.threads = options.threads;
   return result;

@@ -4,8 +4,11 @@
 #include <algorithm>
 
 #include "core/parallel.h"
+#include "energies/shared_motion.h"
 #include "fields/neural_field.h"
+#include "sampling/parts.h"
 #include "solve/field_choice.h"
+#include "solve/held_parts.h"
 #include "solve/radial/full_solve.h"
 #include "solve/report.h"
 #include "solve/setup.h"
@@ -49,6 +52,11 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   require_within_reach(terms.handles, samples.points);
   terms.pull = options.handles;
+  terms.locality.options = options.locality;
+  terms.locality.motion = shared_motion(terms.handles);
+  if (terms.locality.acts())
+    terms.locality.shares =
+        held_shares(samples.points, samples.points, parts_of(samples.points), terms.handles.sources());
   terms.weights = energy_weights(samples, terms.handles);
   if (options.exact_handles) terms.pull.handle_weight = 0.0;
   return terms;

@@ -13,6 +13,7 @@ JetTermList::JetTermList(const JetTermSettings& s) {
   if (s.style.any() && s.gauss > 0.0) own.push_back(style_term(s.style, s.gauss));
   if (s.keep_stance > 0.0) own.push_back(stance_term(s.stance, s.keep_stance));
   if (s.barrier > 0.0) own.push_back(barrier_term(s.barrier_threshold, s.barrier));
+  if (s.locality.acts()) own.push_back(locality_term(s.locality));
   if (s.body) own.push_back(body_term(*s.body));
   if (!s.external.empty()) callers.push_back(external_term(s.external, s.external_weight));
   for (const auto& term : s.further)

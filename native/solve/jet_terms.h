@@ -6,6 +6,7 @@
 
 #include "energies/body.h"
 #include "energies/external_energy.h"
+#include "energies/locality.h"
 #include "energies/stance.h"
 #include "energies/style.h"
 #include "energies/term.h"
@@ -14,8 +15,8 @@
 namespace arapfields {
 
 /// What the terms of a solve's objective that depend on jets are made of, and their weights:
-///   rigidity·mean w(stretch + λ·bend) + gauss·style + keep_stance·stance + barrier·fold_barrier + body +
-///   external + further.
+///   rigidity·mean w(stretch + λ·bend) + gauss·style + keep_stance·stance + barrier·fold_barrier + locality +
+///   body + external + further.
 struct JetTermSettings {
   double rigidity = 1.0;
   bool bends = true;     ///< false: λ is 0 everywhere
@@ -25,7 +26,8 @@ struct JetTermSettings {
   double keep_stance = 0.0;
   double barrier = 0.0;
   double barrier_threshold = SurfaceOptions().barrier_threshold;
-  std::optional<Body<double>> body;  ///< external forces on it
+  Locality locality = Locality::none();  ///< of the samples
+  std::optional<Body<double>> body;      ///< external forces on it
   ExternalEnergies external;
   double external_weight = 1.0;  ///< of the external energies and the further terms
   JetTerms further;              ///< terms of a caller's own

@@ -135,6 +135,11 @@ JetTermList every_term(const SurfaceSamples& samples) {
   settings.keep_stance = 0.6;
   settings.barrier = 0.5;
   settings.barrier_threshold = 0.99;
+  Locality& locality = settings.locality;
+  locality.options = {.locality = 0.8, .locality_limit = 0.06, .locality_smoothing = 0.02};
+  locality.motion.topRightCorner<3, 1>() = Vec3(0.02, 0.0, -0.03);
+  locality.shares = Vector::Ones(samples.size());
+  locality.shares.head(100).setZero();
   settings.body = Body<double>{Vector::Ones(samples.size()), samples.points, 1.1 * samples.points, 0.4};
   settings.further = {std::make_shared<Pull>(aside, 0.3)};
   const JetTermList list(settings);

@@ -201,6 +201,7 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   require(options.handles.handle_weight > 0.0, "handle_weight", "0", "must be positive for 'radial'");
   const ThreadScope threads(options.machine.threads);
   LiveOptions fine = live_options(options);
+  fine.locality = options.locality;
   fine.symmetry = options.symmetry;
   const int more = std::min(most_for_exact, static_cast<int>(more_for_exact * options.centers));
   set_centers(fine, exact != nullptr ? std::max(options.centers, more) : options.centers, samples);
@@ -216,6 +217,7 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   if (exact != nullptr || fine.fine_centers >= worth_a_first) {
     LiveOptions few = live_options(options);
     few.symmetry = options.symmetry;
+    few.locality = options.locality;
     set_centers(few, std::min(most_first, fine.fine_centers / 2), samples);
     few.handle_weight = (exact != nullptr ? followed_closely(options) : options).handles.handle_weight;
     few.tolerance = LiveOptions().tolerance;
@@ -263,6 +265,7 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
                         const Vec3& up, const SolveHooks& hooks) {
   // The solver's rigidity has weight 1: all other weights are divided by options.rigidity.
   LiveOptions live = live_options(options);
+  live.locality.locality = 0.0;
   live.samples = 8000;
   live.coarse_centers = 200;
   live.fine_centers = 1300;

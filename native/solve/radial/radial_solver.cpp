@@ -5,6 +5,7 @@
 
 #include "core/parallel.h"
 #include "energies/alignment.h"
+#include "energies/shared_motion.h"
 #include "sampling/sample_weights.h"
 #include "solve/radial/contact_solve.h"
 #include "solve/radial/handle_motion.h"
@@ -21,12 +22,19 @@ constexpr double single_tolerance = 3e-5, single_floor = 1e-10;
 constexpr double worthwhile_gain = 0.1;
 
 /// Moves the whole shape by the best rigid alignment with the targets: only the handles' energy depends on
-/// it.
+/// it, and locality, which asks for the motion of those handles that share one.
 void follow_rigidly(RadialState& s) {
   const HandleBatch<double>& pairs = s.handles.pairs();
   const VectorF& u = s.measurements(s.fast);
   const Points values = s.fast.objective.latest()->handle_values(u).cast<double>();
-  const Alignment alignment = best_alignment(values, pairs.targets, pairs.weights);
+  Vector weights = pairs.weights;
+  if (const Locality locality = s.locality(); locality.acts()) {
+    const Points shared = affine_image(pairs.sources, locality.motion);
+    for (Index i = 0; i < weights.size(); ++i)
+      if ((shared - pairs.targets).row(i).norm() > shared_within) weights[i] = 0.0;
+    if (!(weights.sum() > 0.0)) return;
+  }
+  const Alignment alignment = best_alignment(values, pairs.targets, weights);
   if (alignment.gain > worthwhile_gain) return;
   s.shape.coefficients *= alignment.rotation.transpose();
   s.shape.coefficients.row(s.problem.basis.center_count()) += alignment.translation.transpose();

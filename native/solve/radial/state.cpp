@@ -5,7 +5,9 @@
 #include <bit>
 
 #include "energies/distortion.h"
+#include "energies/shared_motion.h"
 #include "sampling/sample_choice.h"
+#include "solve/held_parts.h"
 #include "solve/warnings.h"
 
 namespace arapfields {
@@ -69,6 +71,24 @@ TallMatrix<float> RadialState::factor(double inertia) {
   return TallMatrix<float>(inverse_factor(stiffness.matrix(), values, weights), true);
 }
 
+Locality RadialState::locality() {
+  if (!handles.any() || style.any() || dynamics.has_mass() || contact.any()) return Locality::none();
+  Locality result;
+  result.options = problem.options.locality;
+  if (!result.acts()) return result;
+  result.motion = shared_motion(handles.bound(), problem.mirror ? problem.mirror->axis : -1);
+  result.shares = held_shares.get({handles.revision(), problem.energy_revision}, [&] {
+    const auto folded = [&](Points points) {
+      if (problem.mirror)
+        points.col(problem.mirror->axis) = points.col(problem.mirror->axis).cwiseAbs().eval();
+      return points;
+    };
+    return arapfields::held_shares(folded(problem.energy_points), problem.shape->sites, problem.shape->parts,
+                                   folded(handles.pairs().sources));
+  });
+  return result;
+}
+
 JetTermList RadialState::jet_terms(std::optional<Body<double>> body) {
   JetTermSettings settings;
   if (const auto& weighted = style.style()) {
@@ -81,6 +101,7 @@ JetTermList RadialState::jet_terms(std::optional<Body<double>> body) {
   }
   settings.barrier = std::max(problem.options.surface.barrier, contact.has_planes() ? contact_barrier : 0.0);
   settings.barrier_threshold = problem.options.surface.barrier_threshold;
+  settings.locality = locality();
   settings.body = std::move(body);
   settings.external = hooks.energies;
   settings.external_weight = hooks.weight;

@@ -62,6 +62,8 @@ struct RadialState {
   void precondition(double inertia);
   /// The terms of jets of the current parts, for the energy samples.
   JetTermList jet_terms(std::optional<Body<double>> body);
+  /// What keeps the energy samples in place; a style, a mass, and contact go without.
+  Locality locality();
   /// The objective of the current parts, without inertia.
   template <class Scalar>
   RadialObjective<Scalar>& objective(RadialPrecision<Scalar>& precision);
@@ -94,6 +96,7 @@ struct RadialState {
   SurfaceDynamics dynamics;
   ContactTerms contact;
   Dependent<std::vector<Index>, 1> holders;   ///< the handle that holds each sample; −1: none
+  Dependent<Vector, 2> held_shares;           ///< of the energy samples (solve/held_parts.h)
   Dependent<Vector, 1> pin_widths;            ///< width of the shape at each point handle
   Dependent<std::vector<Index>, 1> mirrored;  ///< with symmetry, the sample nearest to each one's reflection
   struct Tried {

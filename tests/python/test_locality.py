@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What no handle has to move stays in place."""
+
+import numpy as np
+import pytest
+from support.geometry import meshes
+from support.geometry.cases import bar_handles, bar_samples, moved, shift, turn
+from support.geometry.fork import BOTTOM, LEG, LEGS, TIP, fork_samples
+
+import arapfields as af
+
+SIZE = 2 * LEG  # of the fork, about
+LESS = 0.15  # of its way without locality: how far the other leg moves
+RIGID = 1e-3  # of the size
+DEFORM = dict(centers=300)
+MIDDLE = BOTTOM @ np.diag([0.2, 1, 1, 1])  # of the bend
+BENT = turn([1, 0, 0], 40, (0, 0, 0.3))
+
+
+@pytest.fixture(scope="module")
+def samples():
+    return fork_samples()
+
+
+def deformed(samples, handles, **options):
+    return af.deform(samples, handles, af.DeformOptions(**DEFORM, **options))
+
+
+def dragged(samples, handles, **options):
+    """By live mode, from rest."""
+    return af.LiveDeformer(samples, handles, af.LiveOptions(**options)).solve(iterations=100, tolerance=1e-6)
+
+
+SOLVES = pytest.mark.parametrize("solve", [deformed, dragged])
+
+
+def way(field, points):
+    return np.linalg.norm(field(points) - points, axis=1).max()
+
+
+@SOLVES
+def test_the_other_leg_of_a_fork_stays(samples, solve):
+    handles = [moved(MIDDLE), moved(TIP, BENT)]
+    other = samples.points[samples.points[:, 0] < -0.1]
+    assert way(solve(samples, handles), other) < LESS * way(solve(samples, handles, locality=0), other)
+
+
+@SOLVES
+@pytest.mark.parametrize("far", [0.02, 0.1, 2.0])
+def test_one_motion_of_all_handles_carries_the_whole(samples, solve, far):
+    motion = turn([1, 2, 0], 100 * far, (0, 0.2, 0.1)) @ shift([0.3 * far * SIZE, far * SIZE, 0])
+    field = solve(samples, [moved(BOTTOM, motion), moved(TIP, motion)])
+    expected = samples.points @ motion[:3, :3].T + motion[:3, 3]
+    assert np.abs(field(samples.points) - expected).max() < RIGID * SIZE
+
+
+@SOLVES
+def test_a_handle_alone_carries_the_whole(samples, solve):
+    field = solve(samples, [af.Point(LEGS[1][0], LEGS[1][0] + [0.4, 0.2, 0.1])])
+    assert np.abs(field(samples.points) - samples.points - [0.4, 0.2, 0.1]).max() < RIGID * SIZE
+
+
+@SOLVES
+def test_a_part_that_nothing_holds_goes_along(solve):
+    ball = meshes.sphere(1.0, 4)
+    speck = meshes.sphere(0.1, 2)[0] + [0, 0, 1.2]
+    both = (
+        np.concatenate([ball[0], speck]),
+        np.concatenate([ball[1], meshes.sphere(0.1, 2)[1] + len(ball[0])]),
+    )
+    samples = af.sample_mesh(*both, 4000)
+    south = np.array([0, 0, -1.0])
+    handles = [af.Point(south, south), af.Point(-south, -1.4 * south)]
+    field = solve(samples, handles)
+    assert np.abs(field(speck) - speck - [0, 0, 0.4]).max() < 0.1
+
+
+def test_styles_and_secondary_motion_do_without():
+    live = af.LiveDeformer(bar_samples(), bar_handles(), af.LiveOptions(fine_centers=60))
+    live.solve()
+    assert live.report.terms["locality"] > 0
+    live.set_style(af.preferred_normals("cube"), 1.0)
+    live.solve()
+    assert "locality" not in live.report.terms and "style" in live.report.terms
+    live.set_style(af.preferred_normals("cube"), 0.0)
+    live.set_secondary_motion(af.SecondaryMotionOptions())
+    live.solve()
+    assert "locality" not in live.report.terms
