@@ -33,8 +33,9 @@ A mesh's vertices (n, 3), stylized by a field, brought nearer to the style by th
 A field is smooth, so it rounds the edges of a style. This takes the vertices `moved` (n, 3) to where the
 triangles, as far as they face a preferred normal within 60°, face it more closely, as rigidly as possible.
 `normals` and `orientation` are those of stylize. `weights` (n,) scale the effect at each vertex; where they
-are 0, vertices stay. With `up` (3,), the lowest vertex along it keeps its height. Vertices at one place stay together, loose ones stay where they are, and no triangle
-is folded that is not folded in `moved` (folded_triangles). Raises InvalidInput and Cancelled.)");
+are 0, vertices stay. With `up` (3,) and no such vertex, the lowest along it keeps its height. Vertices at
+one place stay together, loose ones stay where they are, and no triangle is folded that is not folded in
+`moved` (folded_triangles). Raises InvalidInput and Cancelled.)");
   module.def(
       "folded_triangles",
       [](const ArrayArgument& vertices, const ArrayArgument& triangles, const ArrayArgument& moved) {

@@ -20,8 +20,8 @@ namespace {
 constexpr double no_pull = 0.5, full_pull = 0.7;
 /// Residual of a global step's system, relative to that at its start.
 constexpr double solve_tolerance = 0.05;
-/// Times that the steps of vertices of a folding triangle are halved, before they are none.
-constexpr int most_halvings = 4;
+/// Times that the motion around a folded triangle is evened out, and then halved, before it is none.
+constexpr int most_evenings = 16, most_halvings = 4;
 /// Bytes that a vertex takes with its two triangles, at most.
 constexpr double bytes_per_vertex = 2000.0;
 constexpr Index sharpen_grain = 4096;
@@ -66,37 +66,51 @@ class Finish {
         start_(std::move(start)),
         positions_(start_),
         rotations_(surface.rotations(start_)),
-        expected_(turned_normals(surface, rotations_)),
         laplacian_(surface, (factors.array() + 2.0).matrix(), held, progress) {}
 
   void step() {
-    Points next = positions_;
-    laplacian_.solve(right_hand_side(), start_, solve_tolerance, next);
-    go(next);
+    laplacian_.solve(right_hand_side(), start_, solve_tolerance, positions_);
     rotations_ = surface_.rotations(positions_);
   }
 
-  /// Takes vertices back to the start around triangles that are folded but were not.
+  /// Where triangles are folded that were not at the start, evens out how far vertices around them have
+  /// moved, which gives triangles their shapes of the start back; where that does not help, takes vertices
+  /// back.
   void spare_folds() {
     const std::vector<char> before = folded(start_);
-    Vector kept = Vector::Ones(surface_.nodes());
-    const Points reached = positions_;
+    Points moves = positions_ - start_;
+    std::vector<char> evened(surface_.nodes(), 0);
     for (int round = 0;; ++round) {
       const std::vector<char> now = folded(positions_);
+      std::vector<char> around(surface_.nodes(), 0);
       bool found = false;
       for (Index t = 0; t < surface_.triangles(); ++t) {
         if (!now[t] || before[t]) continue;
         found = true;
-        for (int k = 0; k < 3; ++k)
+        for (int k = 0; k < 3; ++k) {
+          evened[surface_.corners()(t, k)] = 1;
           surface_.around(surface_.corners()(t, k), [&](Index u, int) {
-            for (int l = 0; l < 3; ++l) {
-              double& share = kept[surface_.corners()(u, l)];
-              share = round < most_halvings ? std::min(share, std::ldexp(1.0, -1 - round)) : 0.0;
-            }
+            for (int l = 0; l < 3; ++l) around[surface_.corners()(u, l)] = 1;
           });
+        }
       }
       if (!found) return;
-      positions_ = start_ + kept.asDiagonal() * (reached - start_);
+      const Points last = moves;
+      for (Index i = 0; i < surface_.nodes(); ++i) {
+        if (around[i] && round >= most_evenings / 2) evened[i] = 1;
+        if (round >= most_evenings) {
+          if (around[i]) moves.row(i) *= round < most_evenings + most_halvings ? 0.5 : 0.0;
+        } else if (evened[i] && !held_[i]) {
+          Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+          double count = 0.0;
+          surface_.around(i, [&](Index t, int) {
+            for (int k = 0; k < 3; ++k) sum += last.row(surface_.corners()(t, k));
+            count += 3.0;
+          });
+          moves.row(i) = sum / count;
+        }
+      }
+      positions_ = start_ + moves;
     }
   }
 
@@ -138,29 +152,6 @@ class Finish {
     return result;
   }
 
-  /// Goes to the next positions, less far at vertices of triangles that would turn over.
-  void go(const Points& next) {
-    const Points step = next - positions_;
-    const Points before = surface_.normals(positions_);
-    Vector kept = Vector::Ones(surface_.nodes());
-    Points reached = next;
-    for (int round = 0;; ++round) {
-      const Points after = surface_.normals(reached);
-      bool found = false;
-      for (Index t = 0; t < surface_.triangles(); ++t) {
-        if (after.row(t).dot(expected_.row(t)) > 0.0 || before.row(t).dot(expected_.row(t)) <= 0.0) continue;
-        found = true;
-        for (int k = 0; k < 3; ++k) {
-          double& share = kept[surface_.corners()(t, k)];
-          share = round < most_halvings ? 0.5 * share : 0.0;
-        }
-      }
-      if (!found) break;
-      reached = positions_ + kept.asDiagonal() * step;
-    }
-    positions_ = std::move(reached);
-  }
-
   std::vector<char> folded(const Points& positions) const {
     const Points expected = turned_normals(surface_, surface_.rotations(positions));
     const Points normals = surface_.normals(positions);
@@ -176,7 +167,6 @@ class Finish {
   const Points start_;
   Points positions_;
   std::vector<double> rotations_;
-  const Points expected_;
   SurfaceLaplacian laplacian_;
 };
 
@@ -230,7 +220,7 @@ Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const S
     if (const std::int32_t node = surface.node_of()[v]; node >= 0) {
       if (!held[node]) result.row(v) = finish.positions().row(node);
     }
-  if (up) {
+  if (up && std::find(held.begin(), held.end(), 1) == held.end()) {
     const Vec3 direction = up->normalized();
     const double sunk = (moved * direction).minCoeff() - (result * direction).minCoeff();
     result.rowwise() += sunk * direction.transpose();

@@ -15,8 +15,8 @@ namespace arapfields {
 /// within reach, and a constant system gives the positions (Bouaziz et al. 2012, "Shape-Up"; Liu and Jacobson
 /// 2019, "Cubic Stylization"). No triangle is folded that is not in `moved` (folded_triangles()).
 /// `weights` (n; empty: all 1) scale the effect at each vertex; where they are 0 vertices stay. Vertices of
-/// one place that have stayed together do so; loose vertices stay, too. With `up` the lowest vertex along it
-/// keeps its height. Throws InvalidInput for a broken
+/// one place that have stayed together do so; loose vertices stay, too. With `up`, and no vertex held, the
+/// lowest along it keeps its height. Throws InvalidInput for a broken
 /// mesh, for moved vertices, weights or options that do not fit; Cancelled.
 ARAPFIELDS_EXPORT Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const Style& style,
                                  const SharpenOptions& options = {}, const Progress& progress = {},

@@ -11,8 +11,8 @@
 namespace arapfields {
 namespace {
 
-/// Of half a cotangent: angles from 3° on count as they are, obtuse ones as nearly right.
-constexpr double least_cotangent = 5e-3, most_cotangent = 10.0;
+/// Of half a cotangent: thin triangles are as stiff as they are, down to a tenth of a degree.
+constexpr double least_cotangent = 1e-3, most_cotangent = 300.0;
 /// Twice a triangle's area over its longest edge's square, below which it has none.
 constexpr double no_area = 1e-9;
 /// Share of the moved mesh's diagonal within which vertices of one rest place have stayed together.
