@@ -20,8 +20,9 @@ namespace {
 constexpr double no_pull = 0.5, full_pull = 0.7;
 /// Residual of a global step's system, relative to that at its start.
 constexpr double solve_tolerance = 0.05;
-/// Times that the motion around a folded triangle is evened out, and then halved, before it is none.
-constexpr int most_evenings = 16, most_halvings = 4;
+/// Rounds in which folded triangles are opened; times that the whole is then taken back by half, before it is
+/// taken back wholly.
+constexpr int most_openings = 40, most_halvings = 4;
 /// Bytes that a vertex takes with its two triangles, at most.
 constexpr double bytes_per_vertex = 2000.0;
 constexpr Index sharpen_grain = 4096;
@@ -73,50 +74,61 @@ class Finish {
     rotations_ = surface_.rotations(positions_);
   }
 
-  /// Where triangles are folded that were not at the start, evens out how far vertices around them have
-  /// moved, which gives triangles their shapes of the start back; where that does not help, takes vertices
-  /// back.
+  /// Opens triangles that are folded but were not at the start, one vertex of each at a time; where that does
+  /// not help, takes the whole back as far as it must.
   void spare_folds() {
     const std::vector<char> before = folded(start_);
-    Points moves = positions_ - start_;
-    std::vector<char> evened(surface_.nodes(), 0);
+    double share = 1.0;
     for (int round = 0;; ++round) {
       const std::vector<char> now = folded(positions_);
-      std::vector<char> around(surface_.nodes(), 0);
+      const std::vector<double> turns = surface_.rotations(positions_);
       bool found = false;
       for (Index t = 0; t < surface_.triangles(); ++t) {
         if (!now[t] || before[t]) continue;
         found = true;
-        for (int k = 0; k < 3; ++k) {
-          evened[surface_.corners()(t, k)] = 1;
-          surface_.around(surface_.corners()(t, k), [&](Index u, int) {
-            for (int l = 0; l < 3; ++l) around[surface_.corners()(u, l)] = 1;
-          });
-        }
+        if (round < most_openings) open(t, turns);
       }
       if (!found) return;
-      const Points last = moves;
-      for (Index i = 0; i < surface_.nodes(); ++i) {
-        if (around[i] && round >= most_evenings / 2) evened[i] = 1;
-        if (round >= most_evenings) {
-          if (around[i]) moves.row(i) *= round < most_evenings + most_halvings ? 0.5 : 0.0;
-        } else if (evened[i] && !held_[i]) {
-          Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
-          double count = 0.0;
-          surface_.around(i, [&](Index t, int) {
-            for (int k = 0; k < 3; ++k) sum += last.row(surface_.corners()(t, k));
-            count += 3.0;
-          });
-          moves.row(i) = sum / count;
-        }
-      }
-      positions_ = start_ + moves;
+      if (round < most_openings) continue;
+      const double smaller = round < most_openings + most_halvings ? 0.5 * share : 0.0;
+      positions_ = start_ + smaller / share * (positions_ - start_);
+      share = smaller;
     }
   }
 
   const Points& positions() const { return positions_; }
 
  private:
+  /// Gives a triangle the height over its longest edge that it has at the start: of a thin triangle the
+  /// vertex there hardly moves.
+  void open(Index t, const std::vector<double>& turns) {
+    int apex = 0;
+    double longest = -1.0;
+    const auto corner = [&](int k) { return surface_.corners()(t, k % 3); };
+    for (int k = 0; k < 3; ++k) {
+      const double length = (start_.row(corner(k + 1)) - start_.row(corner(k + 2))).squaredNorm();
+      if (length > longest && !held_[corner(k)]) {
+        longest = length;
+        apex = k;
+      }
+    }
+    if (!(longest > 0.0)) return;
+    const auto from = corner(apex + 1), to = corner(apex + 2);
+    const Vec3 base = start_.row(to) - start_.row(from), side = start_.row(corner(apex)) - start_.row(from);
+    const double along = side.dot(base) / longest;
+    const Vec3 height = side - along * base, edge = positions_.row(to) - positions_.row(from);
+    // The height lies across the edge in the plane that the triangle should have.
+    Mat3 turn = Mat3::Zero();
+    for (int k = 0; k < 3; ++k) turn += rotation_at(turns, corner(k));
+    const Vec3 rest[3] = {surface_.rest().row(from), surface_.rest().row(to),
+                          surface_.rest().row(corner(apex))};
+    const Vec3 normal = turn * (rest[1] - rest[0]).cross(rest[2] - rest[0]);
+    const Vec3 across = normal.cross(edge);
+    if (!(across.norm() > 0.0)) return;
+    positions_.row(corner(apex)) =
+        positions_.row(from) + (along * edge + height.norm() / across.norm() * across).transpose();
+  }
+
   /// Of the global step: Σ of each node's edges of w ((R_i + R_j) e + λ p), p an edge without its part along
   /// the direction that pulls.
   Points right_hand_side() const {

@@ -16,8 +16,8 @@ namespace arapfields {
 /// 2019, "Cubic Stylization"). No triangle is folded that is not in `moved` (folded_triangles()).
 /// `weights` (n; empty: all 1) scale the effect at each vertex; where they are 0 vertices stay. Vertices of
 /// one place that have stayed together do so; loose vertices stay, too. With `up`, and no vertex held, the
-/// lowest along it keeps its height. Throws InvalidInput for a broken
-/// mesh, for moved vertices, weights or options that do not fit; Cancelled.
+/// lowest along it keeps its height. Throws InvalidInput for a broken mesh, for moved vertices, weights or
+/// options that do not fit; Cancelled.
 ARAPFIELDS_EXPORT Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const Style& style,
                                  const SharpenOptions& options = {}, const Progress& progress = {},
                                  const Vector& weights = {}, const std::optional<Vec3>& up = {});
