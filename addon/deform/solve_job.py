@@ -31,9 +31,10 @@ from ..viewport.previews import Preview
 from .first_result import FirstResult
 
 
-def plan_solve_job(context, operator, source, kind, samples, seed, solve, places=False):
+def plan_solve_job(context, operator, source, kind, samples, seed, solve, places=False, finish=None):
     """The job's item. `solve(tracker, surface, samples, weight)` returns the field, on the worker.
 
+    `finish`: stylize.finish.Finish, which gives vertices that the field has moved their final places.
     `places`: the object's transform takes the similarity part of the result, the mesh the rest.
     """
     settings = settings_of(source)
@@ -58,17 +59,24 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
         if preview is not None:
             tracker.rest_preview_points = preview.points
         weight = 1.0 if output == "WARP" else 0.7  # share of the solve in the remaining work
+        weight *= 1.0 if finish is None else 0.8
         points = surface.samples(tracker, samples, seed, own_triangles=surface.exact and output == "WARP")
         field = solve(tracker, surface, points, weight)
         topology, report = None, {"output": output, **field.report.to_dict()}
         needs_own = output == "WARP" or places
-        own = placed.moved(field(surface.vertices, triangles=surface.faces), field) if needs_own else None
+        own = field(surface.vertices, triangles=surface.faces) if needs_own else None
+        if own is not None:
+            if finish is not None and surface.faces is not None:
+                own = finish.finished(tracker, surface, surface.vertices, surface.faces, own, 1.0)
+            own = placed.moved(own, field)
         if output == "REMESH":
             after, topology, figures = surface.extract_moved(tracker, field, **extraction)
             report |= figures
         elif output == "SURFACE":
             extracted, topology = surface.extract(tracker, 0.1, **extraction)
             after = field(extracted)
+            if finish is not None:
+                after = finish.finished(tracker, surface, extracted, topology.corners, after, 1.0)
         else:
             after = own
         if not np.isfinite(after).all():

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Converts handles to native ones, with the samples that each holds."""
 
+import numpy as np
+
 from ..blender.vertex_groups import NearestVertices
 from ..core.geometry.handles import far_from, require_held
 from . import subdivided
+
+AROUND_POINT = 0.03  # of the size: distance within which a point holds vertices
 
 
 def native_handles(af, handles, rest, samples, reaches=True):
@@ -35,6 +39,24 @@ def native_handles(af, handles, rest, samples, reaches=True):
             natives.append(box if by_box else region(af, handle, held, further))
     require_held(counts)
     return natives
+
+
+def held_points(handles, rest, points):
+    """(p,) whether one of the handles holds these points of the surface at rest; what is far from pins is
+    free."""
+    held, holding = np.zeros(len(points), dtype=bool), Holding(rest.vertices, points, handles)
+    around = AROUND_POINT * np.ptp(rest.vertices, axis=0).max()
+    for handle in handles:
+        if handle.kind == "POINT":
+            away = np.linalg.norm(points - handle.rest[:3, 3], axis=1)
+            held |= away <= max(around, away.min())
+        elif handle.kind in ("GROUP", "BONE"):
+            held[holding.of(handle)] = True
+        elif handle.kind == "PIN":
+            held[handle.pinned(points)] = True
+        elif handle.kind != "FAR":
+            held[subdivided.inside(handle, points, rest.shown)[0]] = True
+    return held
 
 
 class Holding:

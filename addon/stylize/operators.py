@@ -19,6 +19,7 @@ from ..handles.native_handles import native_handles
 from ..properties.choices import orientation, result_properties, style
 from ..solver import style_settings
 from ..solver.contact import for_job, native_contact
+from .finish import Finish
 
 
 class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
@@ -72,7 +73,12 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
                 task=tracker.start("Stylizing", weight),
             )
 
-        return plan_solve_job(context, self, source, "STYLIZE", values["samples"], values["seed"], solve)
+        finish = None
+        if values["finish"] and contact is None:
+            shared = {name: values[name] for name in ("strength", "sharpness", "rigidity")}
+            finish = Finish(style, options_of("sharpen", shared), handles, weights)
+        counted = values["samples"], values["seed"]
+        return plan_solve_job(context, self, source, "STYLIZE", *counted, solve, finish=finish)
 
 
 class ARAPFIELDS_OT_set_style(SourceOperator, bpy.types.Operator):

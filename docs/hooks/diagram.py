@@ -19,6 +19,7 @@ HOLDS = {
     "energies": "value and cotangents",
     "optimize": "L-BFGS, Muon, Adam",
     "solve": "deform, stylize, RadialSolver",
+    "sharpen": "styles on a mesh",
     "wrap": "one surface onto another",
     "attach": "what a body carries",
     "curve": "curves of the plane",
@@ -27,7 +28,7 @@ HOLDS = {
     "io": "files, whole or not",
 }
 UNDER_ALL = ("core", "options")
-WIDTH, STEP, BOX, TOP = 1484, 112, 100, 310
+WIDTH, STEP, BOX, TOP = 1596, 112, 100, 310
 INK, LINE = "#1f2937", "#94a3b8"
 
 

@@ -38,6 +38,7 @@ void bind_extraction(py::module_& module);
 void bind_radial(py::module_& module);
 void bind_attach(py::module_& module);
 void bind_curve(py::module_& module);
+void bind_sharpen(py::module_& module);
 void bind_skin(py::module_& module);
 void bind_splats(py::module_& module);
 void bind_contact(py::module_& module);

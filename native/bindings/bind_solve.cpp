@@ -67,14 +67,6 @@ FieldResult deform_samples(const SurfaceSamples& samples, const HandlesArgument&
   return solve(task, [&](const Progress& p) { return deform(samples, held, options, p, hooks); });
 }
 
-Style turned_style(const NormalsArgument& normals, const std::optional<ArrayArgument>& orientation) {
-  Style style = as_style(normals);
-  if (!orientation) return style;
-  const Mat3 turn = as_rotation(*orientation, "orientation");
-  if (style.object) return style.object->turned(turn);
-  return Points(style.preferred * turn.transpose());
-}
-
 FieldResult stylize_samples(const SurfaceSamples& samples, const NormalsArgument& normals,
                             StylizeOptions options, const HandlesArgument& handles,
                             const std::optional<ArrayArgument>& weights,

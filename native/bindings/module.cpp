@@ -26,6 +26,7 @@ PYBIND11_MODULE(_native, module) {
   bind_wrap(module);
   bind_attach(module);
   bind_curve(module);
+  bind_sharpen(module);
   bind_skin(module);
   bind_splats(module);
   bind_io(module);

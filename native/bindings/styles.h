@@ -15,4 +15,13 @@ inline Style as_style(const NormalsArgument& style, const std::string& name = "n
   return as_points(style, name);
 }
 
+/// as_style(), rotated.
+inline Style turned_style(const NormalsArgument& normals, const std::optional<ArrayArgument>& orientation) {
+  Style style = as_style(normals);
+  if (!orientation) return style;
+  const Mat3 turn = as_rotation(*orientation, "orientation");
+  if (style.object) return style.object->turned(turn);
+  return Points(style.preferred * turn.transpose());
+}
+
 }  // namespace arapfields::python

@@ -22,6 +22,7 @@ FOLDERS = [
     "solve",
     "solve/radial",
     "solve/trained",
+    "sharpen",
     "wrap",
     "attach",
     "curve",

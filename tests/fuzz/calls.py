@@ -71,6 +71,18 @@ def calls(rng, things):
                     *[np.ones(60), t["handles"][:1], np.eye(3), np.ones(3), [], None, task],
                 ],
             ),
+            "sharpen": lambda: (
+                by_name(af.sharpen, "weights", "orientation", "up", "task"),
+                [
+                    TETRAHEDRON,
+                    FACES,
+                    TETRAHEDRON,
+                    "cube",
+                    odd_options(rng, t, af.SharpenOptions, iterations=2, threads=1),
+                    *[np.ones(len(TETRAHEDRON)), np.eye(3), np.ones(3), task],
+                ],
+            ),
+            "folded_triangles": lambda: (af.folded_triangles, [TETRAHEDRON, FACES, TETRAHEDRON]),
             "train_inverse": lambda: (
                 by_name(af.train_inverse, "task"),
                 [

@@ -132,6 +132,7 @@ def test_older_names_are_the_same_classes():
     [
         lambda s, t: af.deform(s, [], af.DeformOptions(), t),
         lambda s, t: af.stylize(s, "cube", af.StylizeOptions(), t),
+        lambda s, t: af.sharpen(np.eye(3), [[0, 1, 2]], np.eye(3), "cube", af.SharpenOptions(), t),
         lambda s, t: af.fit_sdf(np.eye(3), [[0, 1, 2]], af.FitOptions(), t),
         lambda s, t: af.LiveDeformer(s, [], af.LiveOptions(), t),
         lambda s, t: af.sample_mesh(np.eye(3), [[0, 1, 2]], 10, 0),

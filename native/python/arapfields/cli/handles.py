@@ -9,6 +9,7 @@ import numpy as np
 from .._files import existing_file, read_text
 from .._native import CuboidHandle, InvalidInput, PointHandle
 
+AROUND_POINT = 0.03  # of the size: distance within which a point handle holds vertices
 KEYS = {
     "cuboid": {
         *("rest", "target", "corners", "center", "half_extents", "rotation", "move", "weight"),
@@ -54,6 +55,20 @@ def build_handles(described, bounds):
     if not handles:
         raise InvalidInput("handles: none are given; use --handles, --box or --point")
     return handles
+
+
+def held_by(handles, points):
+    """(n,) whether a handle holds these points at rest: a box those inside, a point those around."""
+    held = np.zeros(len(points), bool)
+    around = AROUND_POINT * np.ptp(points, axis=0).max()
+    for handle in handles:
+        if isinstance(handle, PointHandle):
+            away = np.linalg.norm(points - handle.rest, axis=1)
+            held |= away <= max(around, away.min())
+        else:
+            into = np.linalg.inv(handle.rest)
+            held |= (np.abs(points @ into[:3, :3].T + into[:3, 3]) <= 1).all(axis=1)
+    return held
 
 
 def _point(item, _):

@@ -31,13 +31,21 @@ class Source:
     def distances(self):
         return af.MeshSdf(*self.mesh.surface) if self.mesh else self._sdf
 
-    def write_moved(self, path, field):
-        """Writes the mesh or splats moved by a field."""
+    def write_moved(self, path, field, finish=None):
+        """Writes the mesh or splats moved by a field.
+
+        `finish(vertices, triangles, moved)` gives a mesh's final positions.
+        """
         if self.splats:
             moved = field.apply_to(self.splats)
             splat_files.write(path, moved, up=self._args.up_axis, name=self.path.stem)
-        else:
-            files.write_moved_mesh(path, self.path, self.mesh, field)
+            return
+
+        def move(vertices):
+            moved = field(vertices)
+            return moved if finish is None else finish(vertices, self.mesh.triangles, moved)
+
+        files.write_moved_mesh(path, self.path, self.mesh, move)
 
 
 def fitted(vertices, triangles, options, args):

@@ -2,6 +2,7 @@
 """The functions of the verbs: read, check the outputs' paths, compute, write."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from .. import grids
 from .._files import json_text
 from .._streams import say
 from . import files, points, splat_files
-from .handles import build_handles, read_handles, rotation, triple, turn_upright
+from .handles import build_handles, held_by, read_handles, rotation, triple, turn_upright
 from .options import given, given_options
 from .running import Outputs, with_progress
 from .sources import Source, fitted, samples
@@ -78,11 +79,27 @@ def stylize(args):
         except (ValueError, argparse.ArgumentTypeError) as error:
             raise af.InvalidInput(f"--style-turn: expected AXIS as x,y,z and DEGREES ({error})") from error
 
+    if contact is not None and args.option_finish:
+        raise af.InvalidInput("--finish: with contact it might enter an obstacle; --no-finish is needed")
+
     def solve(samples, handles, task):
         settings = {"handles": handles, "orientation": orientation, "up": up, "contact": contact}
         return af.stylize(samples, normals, options, **settings, task=task)
 
-    _solve(args, solve, options.seed, needs_handles=False)
+    def finish(vertices, triangles, moved, handles):
+        shares = {name: getattr(options, name) for name in ("strength", "sharpness", "rigidity", "threads")}
+        held = np.where(held_by(handles, vertices), 0.0, 1.0) if handles else None
+        stands = {"weights": held} if handles else {"up": (0.0, 0.0, 1.0) if up is None else up}
+
+        def run(task):
+            sharpened = af.SharpenOptions(**shares)
+            further = {"orientation": orientation, **stands, "task": task}
+            return af.sharpen(vertices, triangles, moved, normals, sharpened, **further)
+
+        return with_progress("finish", run, args.quiet)
+
+    finishes = given(args, "stylize", "finish") and contact is None
+    _solve(args, solve, options.seed, needs_handles=False, finish=finish if finishes else None)
 
 
 def extract(args):
@@ -141,8 +158,11 @@ def grid(args):
     summary(args, f"wrote {shape} distances, {made[2]:.4g} apart, to {args.output}")
 
 
-def _extracted(sdf, args, field=None):
-    """The surface at rest, or deformed by a field, by the method of --through."""
+def _extracted(sdf, args, field=None, finish=None):
+    """The surface at rest, or deformed by a field, by the method of --through.
+
+    `finish(vertices, triangles, moved)` gives the positions of one that a field has moved.
+    """
     through = field is not None and args.through == "inverse"
     settings = {"resolution": args.resolution, "refine_thin": args.refine_thin}
 
@@ -154,11 +174,17 @@ def _extracted(sdf, args, field=None):
     extraction = with_progress("extract", extract, args.quiet)
     _print_notes(args, extraction.report)
     vertices, triangles = extraction
-    return (vertices if through or field is None else field(vertices)), triangles
+    if through or field is None:
+        return vertices, triangles
+    moved = field(vertices)
+    return (moved if finish is None else finish(vertices, triangles, moved)), triangles
 
 
-def _solve(args, solve, seed, needs_handles):
-    """Common part of deform and stylize."""
+def _solve(args, solve, seed, needs_handles, finish=None):
+    """Common part of deform and stylize.
+
+    `finish(vertices, triangles, moved, handles)` gives the final positions of a mesh moved by the field.
+    """
     is_scan = af.GaussianSplats.is_file(args.input)
     with Outputs() as outputs:
         places = {
@@ -183,10 +209,11 @@ def _solve(args, solve, seed, needs_handles):
         bounds = np.array([points_on.points.min(0), points_on.points.max(0)])
         handles = build_handles(described, bounds) if described or needs_handles else []
         field = with_progress(args.verb, lambda task: solve(points_on, handles, task), args.quiet)
+        of_mesh = None if finish is None else partial(finish, handles=handles)
         if "--output" in places:
-            outputs.write(places["--output"], lambda path: source.write_moved(path, field))
+            outputs.write(places["--output"], lambda path: source.write_moved(path, field, of_mesh))
         if "--surface" in places:
-            surface = _extracted(source.sdf(), args, field)
+            surface = _extracted(source.sdf(), args, field, of_mesh)
             outputs.write(places["--surface"], lambda path: files.write_mesh(path, *surface))
         if "--save-field" in places:
             outputs.write(places["--save-field"], field.save)

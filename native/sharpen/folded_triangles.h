@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "core/task.h"
+#include "sharpen/welded_surface.h"
+
+namespace arapfields {
+
+/// Rows of the triangles that face away from where their corners' rotations turn them, in ascending order. A
+/// corner's rotation is the one that fits the edges around its vertex best. Triangles without area are left
+/// out. Throws InvalidInput for a broken mesh, and for moved vertices (n,3) that do not fit or are not
+/// finite.
+ARAPFIELDS_EXPORT std::vector<Index> folded_triangles(PointsIn vertices, TrianglesIn triangles,
+                                                      PointsIn moved);
+
+/// (m',3) where the rotations of their corners turn the triangles' rest normals.
+Points turned_normals(const WeldedSurface& surface, const std::vector<double>& rotations);
+
+/// As many vertices as the mesh has, all finite; throws InvalidInput that names `moved`.
+void require_moved(PointsIn vertices, PointsIn moved);
+
+}  // namespace arapfields

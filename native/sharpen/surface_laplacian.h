@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <Eigen/SparseCholesky>
+#include <vector>
+
+#include "core/task.h"
+#include "sharpen/welded_surface.h"
+
+namespace arapfields {
+
+/// The constant system of a surface's global steps: Σ of its triangles' edges w (x_i − x_j)², a weight for
+/// each triangle times its cotangents, with some nodes held, and all others bound weakly to their places.
+/// Conjugate gradients solve it from the last positions on. They are preconditioned by groups of nodes at
+/// several scales (Bramble, Pasciak and Xu 1990, "Parallel Multilevel Preconditioners"), of which a sparse
+/// Cholesky factor solves the coarsest: the factor of all nodes takes minutes for half a million of them.
+class SurfaceLaplacian {
+ public:
+  /// `factors` (m') of the triangles; `held` (k) 1 for nodes that stay.
+  SurfaceLaplacian(const WeldedSurface& surface, const Vector& factors, const std::vector<char>& held,
+                   const Progress& progress);
+
+  /// Moves x (k,3) towards the solution for the right-hand side (k,3) of the edges, until the residual is
+  /// `tolerance` of that at the start; `places` (k,3) are those that nodes are bound to.
+  void solve(const Points& right, const Points& places, double tolerance, Points& x) const;
+
+ private:
+  /// Groups of the nodes of the level before.
+  struct Level {
+    std::vector<std::int32_t> group_of;  // of each node there
+    std::vector<std::int32_t> first;     // of each group in `members`, and the end
+    std::vector<std::int32_t> members;   // nodes of the groups
+    Vector inverse_diagonal;             // of the groups' matrix; of the coarsest, unused
+  };
+  Points product(const Points& x) const;
+  Points preconditioned(const Points& residual) const;
+
+  std::vector<std::int32_t> first_;  // of each node in `neighbour_` and `weight_`, and the end
+  std::vector<std::int32_t> neighbour_;
+  std::vector<double> weight_;
+  Vector diagonal_;
+  Vector inverse_diagonal_;
+  Vector bound_;  // weights that bind nodes to their places
+  std::vector<char> held_;
+  std::vector<Level> levels_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> coarsest_;
+};
+
+}  // namespace arapfields

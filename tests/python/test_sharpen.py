@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The finish of a style on a mesh's own vertices: identities, folds, what stays, and what is refused."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from support.geometry.meshes import box, sphere, subdivide, suzanne, torus
+
+import arapfields as af
+
+CUBE = np.concatenate([np.eye(3), -np.eye(3)])
+ALIKE = 1e-6  # of a size of about 1: what the conjugate gradients leave
+NONE_ROUNDED = 1e-12
+
+
+def subdivided_box(times):
+    vertices, triangles = box((1.0, 0.7, 0.5))
+    for _ in range(times):
+        vertices, triangles = subdivide(vertices, triangles)
+    return vertices, triangles
+
+
+def rotation(seed):
+    turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    return turn * np.sign(np.linalg.det(turn))
+
+
+def angle_to_style(vertices, triangles, preferred=CUBE):
+    """The mean angle in degrees to the nearest preferred normal, by area."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    areas = np.linalg.norm(normals, axis=1)
+    cosines = (normals / areas[:, None] @ preferred.T).max(axis=1)
+    return np.average(np.degrees(np.arccos(np.clip(cosines, -1, 1))), weights=areas)
+
+
+def meshes():
+    return {
+        "sphere": sphere(1.0, 4),
+        "ellipsoid": (sphere(1.0, 3)[0] * [1.0, 0.6, 0.3], sphere(1.0, 3)[1]),
+        "torus": torus(),
+        "box": subdivided_box(3),
+        "suzanne": suzanne(),
+        "rough": (
+            sphere(1.0, 4)[0] + np.random.default_rng(5).normal(scale=0.02, size=sphere(1.0, 4)[0].shape),
+            sphere(1.0, 4)[1],
+        ),
+    }
+
+
+@pytest.mark.parametrize("options", [{"style_weight": 0.0}, {"strength": 0.0}, {"iterations": 0}])
+def test_without_weight_it_gives_the_moved_vertices_back(options):
+    vertices, triangles = sphere(1.0, 2)
+    moved = vertices @ rotation(0) * [1.0, 1.2, 0.8]
+    assert np.array_equal(af.sharpen(vertices, triangles, moved, "cube", af.SharpenOptions(**options)), moved)
+
+
+@pytest.mark.parametrize("style", ["cube", "object"])
+def test_what_has_its_style_stays_under_rigid_motions(style):
+    """A box, moved and turned with its style, is at its style: a fixed point."""
+    vertices, triangles = subdivided_box(3)
+    turn, shift = rotation(1), np.array([3.0, -2.0, 5.0])
+    normals = "cube" if style == "cube" else af.ObjectStyle(*box())
+    moved = vertices @ turn.T + shift
+    orientation = turn
+    if style == "object":  # an object's targets belong to the normals at rest
+        moved, orientation = vertices + shift, np.eye(3)
+    sharpened = af.sharpen(vertices, triangles, moved, normals, orientation=orientation)
+    assert np.abs(sharpened - moved).max() < (ALIKE if style == "cube" else 0.05)
+
+
+def test_it_moves_and_turns_with_the_whole():
+    vertices, triangles = torus()
+    turn, shift = rotation(2), np.array([1.0, 2.0, 3.0])
+    plain = af.sharpen(vertices, triangles, vertices, "cube")
+    turned = af.sharpen(vertices @ turn.T + shift, triangles, vertices @ turn.T + shift, CUBE @ turn.T)
+    assert np.abs(plain @ turn.T + shift - turned).max() < ALIKE
+    larger = af.sharpen(100 * vertices, triangles, 100 * vertices, "cube")
+    assert np.abs(larger - 100 * plain).max() < 100 * ALIKE
+
+
+@pytest.mark.parametrize("name", sorted(meshes()))
+@pytest.mark.parametrize("style", ["cube", "octahedron"])
+def test_it_comes_nearer_to_the_style_and_folds_nothing(name, style):
+    vertices, triangles = meshes()[name]
+    preferred = af.preferred_normals(style)
+    for weight in (8.0, 64.0):
+        sharpened = af.sharpen(vertices, triangles, vertices, style, af.SharpenOptions(style_weight=weight))
+        before, after = (angle_to_style(v, triangles, preferred) for v in (vertices, sharpened))
+        assert after < before or (name == "box" and style == "cube")
+        assert len(af.folded_triangles(vertices, triangles, sharpened)) == 0
+
+
+@pytest.mark.parametrize("name", sorted(meshes()))
+def test_the_folded_triangles_are_among_those_of_before(name):
+    vertices, triangles = meshes()[name]
+    random = np.random.default_rng(7)
+    moved = vertices * [1.3, 0.8, 1.0] + random.normal(scale=0.04, size=vertices.shape)
+    before = af.folded_triangles(vertices, triangles, moved)
+    after = af.folded_triangles(vertices, triangles, af.sharpen(vertices, triangles, moved, "cube"))
+    assert set(after) <= set(before)
+    assert len(before) > 0 or name == "box"
+
+
+def test_a_triangle_that_has_turned_over_is_folded_and_a_turned_mesh_is_not():
+    vertices, triangles = sphere(1.0, 3)
+    assert len(af.folded_triangles(vertices, triangles, 3 * vertices @ rotation(3).T + 1)) == 0
+    ring = np.unique(triangles[(triangles == 17).any(axis=1)])
+    moved = vertices.copy()
+    moved[17] += 3 * (vertices[ring].mean(axis=0) - vertices[ring[ring != 17][0]])
+    folded = af.folded_triangles(vertices, triangles, moved)
+    assert 0 < len(folded) < len(ring)
+    assert (triangles[folded] == 17).any(axis=1).all()
+
+
+def test_held_vertices_stay_and_weights_scale_the_effect():
+    vertices, triangles = sphere(1.0, 4)
+    weights = np.where(vertices[:, 2] > 0.3, 0.0, 1.0)
+    sharpened = af.sharpen(vertices, triangles, vertices, "cube", weights=weights)
+    assert np.array_equal(sharpened[weights == 0], vertices[weights == 0])
+    assert np.abs(sharpened - vertices).max() > 0.05
+    moved = [
+        np.abs(
+            af.sharpen(vertices, triangles, vertices, "cube", weights=np.full(len(vertices), w)) - vertices
+        )
+        for w in (0.1, 0.3, 1.0)
+    ]
+    assert moved[0].mean() < moved[1].mean() < moved[2].mean()
+    assert np.array_equal(
+        af.sharpen(vertices, triangles, vertices, "cube", weights=np.zeros(len(vertices))), vertices
+    )
+
+
+def test_the_lowest_vertex_keeps_its_height():
+    vertices, triangles = sphere(1.0, 4)
+    up = np.array([0.0, 1.0, 0.0])
+    sharpened = af.sharpen(vertices, triangles, vertices, "octahedron", up=2 * up)
+    assert abs((sharpened @ up).min() - (vertices @ up).min()) < NONE_ROUNDED
+
+
+def test_seams_stay_closed_and_loose_and_flat_parts_do_no_harm():
+    """Each triangle with vertices of its own, a loose vertex, and triangles without area."""
+    vertices, triangles = sphere(1.0, 3)
+    apart = vertices[triangles].reshape(-1, 3)
+    corners = np.arange(len(apart)).reshape(-1, 3)
+    whole = af.sharpen(vertices, triangles, vertices, "cube")
+    assert np.abs(af.sharpen(apart, corners, apart, "cube") - whole[triangles].reshape(-1, 3)).max() < ALIKE
+
+    more = np.vstack([vertices, [[5.0, 5.0, 5.0]]])
+    flat = np.vstack([triangles, [[0, 0, 1], [2, 2, 2]]])
+    sharpened = af.sharpen(more, flat, more, "cube")
+    assert np.array_equal(sharpened[-1], more[-1])
+    assert np.abs(sharpened[:-1] - whole).max() < ALIKE
+    nothing = np.zeros((3, 3))
+    assert np.array_equal(af.sharpen(nothing, [[0, 1, 2]], nothing, "cube"), nothing)
+
+
+def test_parts_that_have_come_apart_stay_apart():
+    """Two boxes with a common face at rest: what was moved away is not pulled back."""
+    vertices, triangles = subdivided_box(2)
+    both = np.vstack([vertices, vertices + np.array([2.0, 0.0, 0.0])])
+    faces = np.vstack([triangles, triangles + len(vertices)])
+    moved = both + np.where(np.arange(len(both))[:, None] < len(vertices), 0.0, 1.0) * [1.5, 0.0, 0.0]
+    sharpened = af.sharpen(both, faces, moved, "cube")
+    assert np.abs(sharpened - moved).max() < ALIKE
+
+
+def test_threads_change_nothing():
+    vertices, triangles = sphere(1.0, 5)
+    one, four = (
+        af.sharpen(vertices, triangles, vertices, "cube", af.SharpenOptions(threads=threads, iterations=4))
+        for threads in (1, 4)
+    )
+    assert np.array_equal(one, four)
+
+
+def test_it_hears_cancel_and_its_progress_rises():
+    vertices, triangles = sphere(1.0, 7)
+    task, seen = af.Task(), []
+    options = af.SharpenOptions(iterations=100_000)
+
+    def watch():
+        while len(seen) < 30:
+            seen.append(task.progress)
+            time.sleep(0.01)
+        task.cancel()
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    with pytest.raises(af.Cancelled):
+        af.sharpen(vertices, triangles, vertices, "cube", options, task=task)
+    watcher.join()
+    assert seen == sorted(seen) and task.progress < 1.0
+
+
+VERTICES, TRIANGLES = sphere(1.0, 1)
+
+
+@pytest.mark.parametrize(
+    "name, call",
+    [
+        ("vertices", lambda: af.sharpen(VERTICES * np.nan, TRIANGLES, VERTICES, "cube")),
+        ("triangles", lambda: af.sharpen(VERTICES, TRIANGLES + 100, VERTICES, "cube")),
+        ("moved", lambda: af.sharpen(VERTICES, TRIANGLES, VERTICES[1:], "cube")),
+        ("moved", lambda: af.sharpen(VERTICES, TRIANGLES, np.full_like(VERTICES, np.inf), "cube")),
+        ("moved", lambda: af.folded_triangles(VERTICES, TRIANGLES, VERTICES[1:])),
+        ("normals", lambda: af.sharpen(VERTICES, TRIANGLES, VERTICES, np.zeros((1, 3)))),
+        ("weights", lambda: af.sharpen(VERTICES, TRIANGLES, VERTICES, "cube", weights=[1.0])),
+        (
+            "weights",
+            lambda: af.sharpen(VERTICES, TRIANGLES, VERTICES, "cube", weights=-np.ones(len(VERTICES))),
+        ),
+        ("up", lambda: af.sharpen(VERTICES, TRIANGLES, VERTICES, "cube", up=np.zeros(3))),
+        (
+            "style_weight",
+            lambda: af.sharpen(VERTICES, TRIANGLES, VERTICES, "cube", af.SharpenOptions(style_weight=-1.0)),
+        ),
+    ],
+)
+def test_what_does_not_fit_is_named(name, call):
+    with pytest.raises(af.InvalidInput, match=name):
+        call()
