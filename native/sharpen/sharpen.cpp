@@ -9,6 +9,7 @@
 #include "core/parallel.h"
 #include "core/unit_rows.h"
 #include "energies/gauss.h"
+#include "mesh/outward_triangles.h"
 #include "sharpen/folded_triangles.h"
 #include "sharpen/surface_laplacian.h"
 
@@ -201,7 +202,7 @@ Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const S
   const CancelScope cancel(progress);
 
   progress.report(0.0, "sharpening");
-  const WeldedSurface surface({vertices, triangles}, moved);
+  const WeldedSurface surface(facing_outwards({vertices, triangles}), moved);
   const StyleAtTriangles at(style, surface, options);
   const double weight = options.style_weight * options.strength / options.rigidity;
   Vector factors = weight * at.factors;
