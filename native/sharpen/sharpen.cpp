@@ -41,6 +41,7 @@ struct StyleAtTriangles {
     targets = at.targets;
     if (!at.preference) return;
     preferred = at.preference->normals;
+    factors *= at.preference->balance;
     if (options.sharpness > 0.0) {
       const double softened = std::min(1.0, options.sharpness / style_sharpness(preferred));
       factors *= softened * softened;
