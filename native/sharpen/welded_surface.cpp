@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
-#include "distance/is_closed.h"
+#include "mesh/is_closed.h"
 #include "energies/rotation.h"
 
 namespace arapfields {
