@@ -144,6 +144,7 @@ def test_parts_that_cut_each_other_at_rest_slide_freely():
     pulled = [turned(0, shift=(x, 0, 0)) @ m for x, m in zip((0, -0.1, 0.1), handles, strict=True)]
     shapes = []
     for contact in (None, af.Contact(itself=True)):
-        solver = af.LiveDeformer(samples, [af.Cuboid(m, m) for m in handles], contact=contact)
+        ends, alike = [af.Cuboid(m, m) for m in handles], af.LiveOptions(locality=0)  # as in contact
+        solver = af.LiveDeformer(samples, ends, alike, contact=contact)
         shapes.append(solver.solve(pulled)(samples.points))
     assert (shapes[0] == shapes[1]).all()
