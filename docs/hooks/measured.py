@@ -123,6 +123,12 @@ def faster():
     return f"{float(row[-1]):.3g} times faster a step"
 
 
+def fingers():
+    """Motion of the neighbours of a bent finger, by field."""
+    shares = [float(row[i]) for row in table_rows("middle forward 20 degrees") for i in (4, 6)]
+    return f"{min(shares):.1f} to {max(shares):.1f} %"
+
+
 def beside(start, further=""):
     """A sentence for this library and one for implicit-arap, from docs/peers.json by the problem's start."""
     rows = json.loads((DOCS / "peers.json").read_text())["rows"]
@@ -156,7 +162,7 @@ FIGURE = {
     "sheet": "style_sheet",
 }  # {text: figure}, if the names differ
 TEXTS = [hero, bending, deformations, exact, inverse, inverted, styles, cubes, sheet, live, median]
-OTHERS = [faster, figure6, figure7]  # from other files than the manifest
+OTHERS = [faster, fingers, figure6, figure7]  # from other files than the manifest
 
 
 def refreshed(text):

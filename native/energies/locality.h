@@ -11,7 +11,7 @@ namespace arapfields {
 class JetTerm;
 
 /// How strongly samples stay where a motion of the whole takes them.
-struct ARAPFIELDS_EXPORT_TO_TESTS Locality {
+struct Locality {
   LocalityOptions options;         ///< weight w, limit c, smoothing ε
   Mat4 motion = Mat4::Identity();  ///< m
   Vector shares;                   ///< (n) factors of the samples, 0: such a one follows others; empty: all 1

@@ -207,10 +207,6 @@ std::shared_ptr<NodeSight> read_sight(ArchiveReader& file, const JsonObject& obj
                                       const std::string& prefix, Index nodes) {
   const Index pairs = object.integer("pairs", 0, INT32_MAX - 1),
               places = object.integer("places", 0, most_rows);
-  // The library makes at most 2,250; what nodes see of each other is looked at pair by pair.
-  constexpr Index most_nodes = 20'000;
-  require(nodes <= most_nodes, prefix + "starts", "there are " + std::to_string(nodes) + " nodes",
-          "at most " + std::to_string(most_nodes) + " can have lists of what they see");
   auto sight = std::make_shared<NodeSight>();
   sight->reach = object.number("reach");
   require_positive(object.name("reach"), sight->reach);
@@ -237,7 +233,9 @@ std::shared_ptr<RadialField> read_radial(ArchiveReader& file, const JsonObject& 
   basis.radii = file.doubles(prefix + "radii", {count});
   if (object.has("embedding")) {
     const JsonObject embedding(object.at("embedding"), object.name("embedding"), {"nodes", "width", "sight"});
-    const Index nodes = embedding.integer("nodes", 1, most_rows);
+    // What nodes see of each other is looked at pair by pair; the library makes at most 2,250.
+    constexpr Index most_sighted = 20'000;
+    const Index nodes = embedding.integer("nodes", 1, embedding.has("sight") ? most_sighted : most_rows);
     InteriorEmbedding restored;
 
     restored.nodes = file.points(prefix + "embedding.nodes", nodes);

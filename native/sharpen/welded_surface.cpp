@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "core/parallel.h"
-#include "mesh/is_closed.h"
 #include "energies/rotation.h"
+#include "mesh/is_closed.h"
 
 namespace arapfields {
 namespace {

@@ -95,7 +95,7 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
   result.measured = count;
   result.distortion = distortion<double>(JetView<const double>(jets.view()));
   const double diagonal = diagonal_of(mesh.vertices);
-  double area = 0.0, turned_area = 0.0, largest_turned = 0.0;
+  double area = 0.0, turned_area = 0.0, folded_area = 0.0, largest_turned = 0.0;
   for (Index t = 0; t < count; ++t) {
     Vec3 rest[3], now[3];
     for (int k = 0; k < 3; ++k) {
@@ -117,7 +117,10 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
     Mat3 jacobian;
     for (int k = 0; k < 3; ++k) jacobian.col(k) = Eigen::Map<const Vec3>(jets.view().at(first_column(k), t));
     const double determinant = jacobian.determinant();
-    if (!(determinant > 0.0)) continue;
+    if (!(determinant > 0.0)) {
+      folded_area += before.norm();
+      continue;
+    }
     // Normals move by the cofactors of J.
     if (!((determinant * jacobian.inverse().transpose() * before).dot(after) < 0.0)) continue;
     ++result.turned;
@@ -127,7 +130,10 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
       result.turned_place = middles.row(t).transpose();
     }
   }
-  if (area > 0.0) result.turned_share = turned_area / area;
+  if (area > 0.0) {
+    result.turned_share = turned_area / area;
+    result.distortion.flipped_share = folded_area / area;
+  }
   return result;
 }
 

@@ -14,7 +14,7 @@ namespace arapfields {
 /// with the longest edges are looked at, which are the first to go wrong.
 struct MeshMeasures {
   static constexpr Index most_measured = 20'000;
-  Distortion distortion;  ///< at the triangles' middles
+  Distortion distortion;  ///< at the triangles' middles; its share is one of their area
   Index measured = 0;     ///< triangles
   Index turned = 0;       ///< of them, those whose corners turn it over where the field itself does not fold
   double turned_share = 0.0;          ///< of the measured area

@@ -77,7 +77,7 @@ def known(*folders):
 
 def test_the_source_distribution_has_what_builds_and_nothing_else(tmp_path):
     top = {"CHANGELOG.md", "CMakeLists.txt", "LICENSE", "README.md", "pyproject.toml", "PKG-INFO"}
-    top.add("THIRD_PARTY.txt")
+    top |= {"CITATION.cff", "THIRD_PARTY.txt"}
     cmake = {name for name in known("cmake") if not re.search(r"/wheel/|mingw", name)}
     assert in_source(release.build_sdist(tmp_path)) == top | cmake | known("native")
 

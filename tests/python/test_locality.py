@@ -12,7 +12,8 @@ import arapfields as af
 SIZE = 2 * LEG  # of the fork, about
 LESS = 0.15  # of its way without locality: how far the other leg moves
 RIGID = 1e-3  # of the size
-DEFORM = dict(centers=300)
+WEIGHT = 0.1
+DEFORM = dict(centers=300, locality=WEIGHT)
 MIDDLE = BOTTOM @ np.diag([0.2, 1, 1, 1])  # of the bend
 BENT = turn([1, 0, 0], 40, (0, 0, 0.3))
 
@@ -23,12 +24,14 @@ def samples():
 
 
 def deformed(samples, handles, **options):
-    return af.deform(samples, handles, af.DeformOptions(**DEFORM, **options))
+    return af.deform(samples, handles, af.DeformOptions(**DEFORM | options))
 
 
 def dragged(samples, handles, **options):
     """By live mode, from rest."""
-    return af.LiveDeformer(samples, handles, af.LiveOptions(**options)).solve(iterations=100, tolerance=1e-6)
+    return af.LiveDeformer(samples, handles, af.LiveOptions(**{"locality": WEIGHT} | options)).solve(
+        iterations=100, tolerance=1e-6
+    )
 
 
 SOLVES = pytest.mark.parametrize("solve", [deformed, dragged])
@@ -76,7 +79,7 @@ def test_a_part_that_nothing_holds_goes_along(solve):
 
 
 def test_styles_and_secondary_motion_do_without():
-    live = af.LiveDeformer(bar_samples(), bar_handles(), af.LiveOptions(fine_centers=60))
+    live = af.LiveDeformer(bar_samples(), bar_handles(), af.LiveOptions(fine_centers=60, locality=WEIGHT))
     live.solve()
     assert live.report.terms["locality"] > 0
     live.set_style(af.preferred_normals("cube"), 1.0)

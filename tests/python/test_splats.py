@@ -206,7 +206,7 @@ def test_the_command_line_bends_a_scan(tmp_path, capsys):
     assert main(["warp", str(saved), str(scan), "-o", str(tmp_path / "again.ply"), "--quiet"]) == 0
     assert (tmp_path / "again.ply").read_bytes() == out.read_bytes()
     for arguments, word in (
-        (["deform", str(scan), "-o", str(tmp_path / "bent.obj"), *box], "no place for splats"),
+        (["deform", str(scan), "-o", str(tmp_path / "bent.obj"), *box], "allowed are .ply, .glb, .usd"),
         (["warp", str(saved), str(scan), "-o", str(out), "--share", "0.5"], "--share"),
         (["extract", str(scan), "-o", str(tmp_path / "bent.obj")], "holds splats"),
     ):
