@@ -15,7 +15,8 @@ namespace {
 constexpr double long_edge = 3.0;
 /// Edges that stay shorter than this, in diagonals of the mesh, are not seen.
 constexpr double least_edge = 1e-3;
-/// Share of the measured triangles up to which turned ones are not told of: slivers turn at a touch.
+/// Share of the measured triangles up to which folded or turned ones are not told of: slivers turn at a
+/// touch.
 constexpr double few_turned = 0.002;
 
 Vec3 corner(const Points& vertices, const Triangles& triangles, Index t, int k) {
@@ -95,7 +96,7 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
   result.measured = count;
   result.distortion = distortion<double>(JetView<const double>(jets.view()));
   const double diagonal = diagonal_of(mesh.vertices);
-  double area = 0.0, turned_area = 0.0, folded_area = 0.0, largest_turned = 0.0;
+  double area = 0.0, turned_area = 0.0, largest_turned = 0.0;
   for (Index t = 0; t < count; ++t) {
     Vec3 rest[3], now[3];
     for (int k = 0; k < 3; ++k) {
@@ -118,7 +119,7 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
     for (int k = 0; k < 3; ++k) jacobian.col(k) = Eigen::Map<const Vec3>(jets.view().at(first_column(k), t));
     const double determinant = jacobian.determinant();
     if (!(determinant > 0.0)) {
-      folded_area += before.norm();
+      ++result.folded;
       continue;
     }
     // Normals move by the cofactors of J.
@@ -130,15 +131,15 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
       result.turned_place = middles.row(t).transpose();
     }
   }
-  if (area > 0.0) {
-    result.turned_share = turned_area / area;
-    result.distortion.flipped_share = folded_area / area;
-  }
+  if (area > 0.0) result.turned_share = turned_area / area;
   return result;
 }
 
 std::vector<std::string> warnings_on(const MeshMeasures& measures) {
   std::vector<std::string> warnings;
+  if (static_cast<double>(measures.folded) > few_turned * static_cast<double>(measures.measured))
+    warnings.push_back("the field folds at the middles of " + std::to_string(measures.folded) + " of " +
+                       std::to_string(measures.measured) + " triangles");
   if (static_cast<double>(measures.turned) > few_turned * static_cast<double>(measures.measured))
     warnings.push_back(std::to_string(measures.turned) + " of " + std::to_string(measures.measured) +
                        " triangles turn over (" + number_of("%.2g", 100.0 * measures.turned_share) +

@@ -14,8 +14,9 @@ namespace arapfields {
 /// with the longest edges are looked at, which are the first to go wrong.
 struct MeshMeasures {
   static constexpr Index most_measured = 20'000;
-  Distortion distortion;  ///< at the triangles' middles; its share is one of their area
+  Distortion distortion;  ///< at the triangles' middles
   Index measured = 0;     ///< triangles
+  Index folded = 0;       ///< of them, those with det J ≤ 0 at their middles
   Index turned = 0;       ///< of them, those whose corners turn it over where the field itself does not fold
   double turned_share = 0.0;          ///< of the measured area
   Vec3 turned_place = Vec3::Zero();   ///< middle of the largest of them, in mesh coordinates at rest

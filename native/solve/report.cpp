@@ -105,9 +105,7 @@ Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples&
   std::vector<std::string> of_mesh;
   if (samples.mesh) {
     const MeshMeasures mesh = measure_triangles(*solution.field, *samples.mesh);
-    Distortion& distortion = solution.report.distortion;
-    merge(distortion, mesh.distortion);
-    distortion.flipped_share = std::max(distortion.flipped_share, mesh.distortion.flipped_share);
+    merge(solution.report.distortion, mesh.distortion);
     of_mesh = warnings_on(mesh);
   }
   solution.report.warnings = warnings_on(solution.report.distortion, far, terms.handles);
