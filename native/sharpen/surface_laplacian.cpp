@@ -13,7 +13,7 @@ namespace {
 constexpr Index coarsest_size = 1500;
 /// Weight that binds a node to its place, relative to its diagonal.
 constexpr double binding = 1e-7;
-constexpr int most_iterations = 60;
+constexpr int most_iterations = 12;
 constexpr Index laplacian_grain = 4096;
 
 /// A symmetric matrix without its diagonal, as neighbours and weights of each row.
