@@ -20,7 +20,7 @@ COUNTS = {
     "api": 350,
 }
 # A file that shrinks while it is read, a pipe (tests/python/test_files.py), two refusals of the writer, and
-# two of checksums (tests/python/test_checksums.py): the damaged files are of version 1, which has none.
+# two of checksums (tests/python/test_files.py): the damaged files are of version 1, which has none.
 ELSEWHERE = {
     "it is being written to",
     "pipes, devices and sockets cannot be read",
@@ -28,7 +28,7 @@ ELSEWHERE = {
     "a kind without a file format",
     "files from version 2 on have one",
     "sixteen digits are needed",
-    "whole numbers from 0 to",  # what an embedding's nodes see: tests/python/test_touching_parts.py
+    "whole numbers from 0 to",  # what an embedding's nodes see: tests/python/test_parts.py
     "they rise from 0 to the number of pairs",
     "none may be negative",
 }

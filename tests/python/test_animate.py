@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`arapfields animate`: each frame its own, the same by shards, after kills, in every format."""
+"""The verb `animate`, the tracks of handles that it reads, and the frames that it writes."""
 
+import io
 import json
 import os
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import time
+import zipfile
 
 import numpy as np
 import pytest
@@ -20,9 +23,15 @@ from support.programs.cli import process, run
 
 import arapfields as af
 from arapfields._files import whole_file
+from arapfields._locks import lock
+from arapfields._native import InvalidInput
 from arapfields.cli.files import read_mesh
 from arapfields.cli.frame_solver import STEPS, TOLERANCE
+from arapfields.cli.frames import FrameStore
+from arapfields.cli.tracks import read_tracks
 from arapfields.cli.usd import write_usd
+
+# `arapfields animate`: each frame its own, the same by shards, after kills, in every format.
 
 FRAMES = 6
 SAME = {"samples": 400, "coarse_centers": 10, "fine_centers": 40}
@@ -241,3 +250,257 @@ def test_secondary_motion_follows_frame_by_frame(place, capsys):
     for further in (["--damping", "1"], ["--secondary", "--shard", "1/2"]):
         assert animate(place, "none.pc2", *further) != 0
         assert further[-2] in capsys.readouterr().err
+
+
+# `arapfields animate` with Gaussian splats: a PLY file a frame.
+
+SOLVE = [
+    "--coarse-centers",
+    "10",
+    "--fine-centers",
+    "40",
+    "--iterations",
+    "6",
+    "--tolerance",
+    "1e-2",
+    "--quiet",
+]
+
+
+def test_each_frame_is_a_file_whichever_shard_makes_it(tmp_path):
+    vertices, triangles = sphere(1.0, 2)
+    samples = af.sample_mesh(vertices * (2.0, 0.5, 0.5), triangles, 600)
+    one = np.ones((len(samples), 1))
+    colours = one[:, :, None] * [1, 0, 0]
+    scan = af.GaussianSplats(
+        samples.points, one * [1, 0, 0, 0], one * [0.02, 0.02, 0.01], 0.9 * one[:, 0], colours
+    )
+    scan.save(tmp_path / "scan.ply")
+    frames = [(turned(12.0 * i) @ RIGHT).tolist() for i in range(FRAMES)]
+    held = {"name": "held", "type": "cuboid", "rest": LEFT.tolist(), "frames": [LEFT.tolist()] * FRAMES}
+    moved = {"name": "moved", "type": "cuboid", "rest": RIGHT.tolist(), "frames": frames}
+    (tmp_path / "tracks.json").write_text(json.dumps({"fps": 25, "start": 1, "handles": [held, moved]}))
+    given = ["animate", tmp_path / "scan.ply", "--tracks", tmp_path / "tracks.json", *SOLVE]
+    assert run(*given, "-o", tmp_path / "walk.ply") == 0
+    made = sorted(tmp_path.glob("walk.*"))
+    assert [path.name for path in made] == [f"walk.{number:04d}.ply" for number in range(1, FRAMES + 1)]
+    rest, *_, fifth, last = (af.GaussianSplats.load(path) for path in made)
+    right = samples.points[:, 0] > 1.8
+    assert np.abs(rest.centers - scan.centers).max() < 0.02
+    assert np.linalg.norm(last.centers[:600] - scan.centers, axis=1)[right].min() > 0.3
+    assert np.abs(last.rotations[:600][right, 0]).max() < 0.95
+    assert run(*given, "-o", tmp_path / "part.ply", "--shard", "2/3") == 0
+    assert [path.name for path in sorted(tmp_path.glob("part.*"))] == ["part.0002.ply", "part.0005.ply"]
+    assert np.array_equal(af.GaussianSplats.load(tmp_path / "part.0005.ply").centers, fifth.centers)
+    assert run(*given, "-o", tmp_path / "walk.pc2") != 0
+
+
+# Two runs of `animate` on one output: the second says so, and ends well.
+
+TWICE_FRAMES = 4
+TWICE_QUICK = [
+    "--iterations",
+    "2",
+    "--samples",
+    "200",
+    "--coarse-centers",
+    "8",
+    "--fine-centers",
+    "20",
+    "--threads",
+    "1",
+]
+
+
+@pytest.fixture
+def place_of_two(tmp_path):
+    vertices, triangles = sphere(1.0, 2)
+    trimesh.Trimesh(vertices * (2.0, 0.5, 0.5), triangles, process=False).export(tmp_path / "bar.ply")
+    for name, step in (("tracks", 10.0), ("other", 12.0)):
+        right = [(turned(step * i) @ RIGHT).tolist() for i in range(TWICE_FRAMES)]
+        handles = [("held", LEFT, [LEFT.tolist()] * TWICE_FRAMES), ("moved", RIGHT, right)]
+        told = [{"name": n, "type": "cuboid", "rest": r.tolist(), "frames": f} for n, r, f in handles]
+        (tmp_path / f"{name}.json").write_text(json.dumps({"fps": 25, "start": 1, "handles": told}))
+    return tmp_path
+
+
+def flags(place, *further, tracks="tracks"):
+    given = [place / "bar.ply", "--tracks", place / f"{tracks}.json", "-o", place / "x.pc2"]
+    return "animate", *given, *TWICE_QUICK, *further
+
+
+def other(arguments):
+    """The command in another process, whose locks are its own: exit code, and what it says."""
+    command, environment = process(*arguments)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_the_second_of_two_says_so(place_of_two, capfd):
+    store = place_of_two / ".x.pc2.frames"
+    part = "--shard", "1/2"
+    assert run(*flags(place_of_two, *part)) == 0  # leaves its frames, and what it was to make
+    with open(store / "lock-1-2", "r+b") as file:
+        lock(file)
+        code, said = other(flags(place_of_two, *part))
+        assert code == 0 and "another animate is at work on the same frames" in said
+        code, said = other(flags(place_of_two, *part, tracks="other"))
+        assert code == 2 and "another run, of other frames" in said
+    capfd.readouterr()
+    assert run(*flags(place_of_two)) == 0
+    assert "wrote" in capfd.readouterr().out and not store.exists()
+
+
+def test_a_run_that_fails_leaves_no_folder(tmp_path):
+    store = FrameStore(tmp_path / "x.pc2", 3, b"")
+    with pytest.raises(InvalidInput), store.only_run("1-1", []) as first:
+        assert first
+        raise InvalidInput("something")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_point_cache_is_read_from_several_threads(tmp_path):
+    """Each answer is the sample that was asked for."""
+    import threading
+
+    from arapfields import PointCacheReader, PointCacheWriter
+
+    with PointCacheWriter(tmp_path / "x.pc2", points=500, frames=40) as cache:
+        for number in range(40):
+            cache.write(np.full((500, 3), float(number)))
+    wrong = []
+    with PointCacheReader(tmp_path / "x.pc2") as cache:
+
+        def read(first):
+            for number in range(400):
+                index = (first + 7 * number) % 40
+                if not (cache[index] == index).all():
+                    wrong.append(index)
+
+        threads = [threading.Thread(target=read, args=(first,)) for first in range(3)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert not wrong
+
+
+def test_a_foreign_file_among_the_frames_stays(place_of_two):
+    store = place_of_two / ".x.pc2.frames"
+    assert run(*flags(place_of_two, "--shard", "1/2")) == 0
+    for name in ("notes.txt", "0000001-mine", "0000001-" + "x" * 32):
+        (store / name).write_text("kept")
+    assert run(*flags(place_of_two)) == 0
+    left = {path.name for path in store.iterdir() if not path.name.startswith("lock")}
+    assert left == {"notes.txt", "0000001-mine", "0000001-" + "x" * 32}
+
+
+# Handle tracks that are damaged or do not fit: named, by file, handle and frame.
+
+BOUNDS = np.array([[-2.0, -0.5, -0.5], [2.0, 0.5, 0.5]])
+
+
+def handle(**changed):
+    return {"name": "end", "type": "cuboid", "rest": RIGHT.tolist(), "frames": [RIGHT.tolist()] * 3} | changed
+
+
+def tracks(*handles, **changed):
+    return {"fps": 24, "handles": list(handles or [handle()])} | changed
+
+
+def test_frames_are_numbered_and_boxes_may_be_open(tmp_path):
+    held = {"type": "cuboid", "corners": [[None] * 3, [-1.5, None, None]], "frames": [np.eye(4).tolist()] * 3}
+    (tmp_path / "t.json").write_text(json.dumps(tracks(handle(weight=2.0), start=-5)))
+    read = read_tracks(tmp_path / "t.json")
+    assert (read.fps, read.start, read.count) == (24.0, -5, 3)
+    (end,) = read.handles(2, BOUNDS)
+    assert np.array_equal(end.target, RIGHT) and end.weight == 2
+    (tmp_path / "t.json").write_text(json.dumps(tracks(held)))
+    with pytest.raises(af.InvalidInput, match=r"t\.json: frame 1, handle handles\[0\]: .*rigid"):
+        read_tracks(tmp_path / "t.json").handles(0, BOUNDS)  # a matrix is where the box is, not how it moved
+
+
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        ("{", "not JSON"),
+        ("[" * 100_000, "not JSON"),
+        ("[]", "expected"),
+        (tracks(fps=0), "fps must be above 0"),
+        (tracks(fps=None), "fps is None"),
+        (tracks(fps=True), "fps is True"),
+        (tracks(fps=1e9), "fps"),
+        (tracks(start=1.5), "start an integer"),
+        (tracks(start=1e30), "start is"),
+        (tracks(rate=24), "unknown key 'rate'"),
+        ({"fps": 24, "handles": []}, "has no handle"),
+        (tracks(3), r"handles\[0\]: an object"),
+        (tracks(handle(name=3)), "name is no text"),
+        (tracks(handle(frames=[])), "has no frame"),
+        (tracks(handle(frames=None)), "end: 'frames' is missing"),
+        (tracks(handle(frames=[[1, 2, 3]])), r"end: frames has shape \(1, 3\)"),
+        (tracks(handle(frames=[[1], [2, 3]])), "end: frames"),
+        (tracks(handle(frames=[np.full((4, 4), np.nan).tolist()])), "place 0 is NaN"),
+        (tracks(handle(), handle(name="b", frames=[RIGHT.tolist()])), "frames differ: end 3, b 1"),
+        (tracks(handle(target=RIGHT.tolist())), "'target' and 'move' are for single poses"),
+        (tracks(handle(type="sphere", frames=[np.eye(4).tolist()])), "type is 'sphere'"),
+        (tracks(handle(colour=3)), "unknown key 'colour'"),
+        (tracks(handle(frames=[RIGHT.tolist(), (2 * RIGHT).tolist()])), "frame 2, handle end: "),
+    ],
+)
+def test_what_is_wrong_with_json_is_named(content, text, tmp_path):
+    path = tmp_path / "t.json"
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
+    with pytest.raises(af.InvalidInput, match=text) as error:
+        read = read_tracks(path)
+        for index in range(read.count):
+            read.handles(index, BOUNDS)
+    assert str(error.value).startswith(f"{path}: ")
+
+
+def archive(**changed):
+    rest = np.array([LEFT, RIGHT])
+    frames = np.stack([np.array([LEFT, turned(20.0 * i) @ RIGHT]) for i in range(3)])
+    return {"fps": 24.0, "rest": rest, "frames": frames} | changed
+
+
+@pytest.mark.parametrize(
+    ("arrays", "text"),
+    [
+        ({"fps": 24.0, "rest": np.zeros((1, 4, 4))}, "has no array 'frames'"),
+        (archive(frames=np.zeros((3, 1, 4, 4))), "shapes"),
+        (archive(rest=np.zeros((2, 4, 4), complex)), "numbers of shapes"),
+        (archive(names=np.array(["a"])), "names has shape"),
+        (archive(kinds=np.array(["cuboid", "sphere"])), "type is 'sphere'"),
+        (archive(fps=np.array([24.0, 25.0])), "single numbers"),
+        (archive(fps="fast"), "fps is 'fast'"),
+        (archive(extra=np.zeros(3)), "unknown array 'extra'"),
+        (archive(names=np.array(["a", None])), "does not fit"),  # objects are never unpickled
+        (archive(frames=np.full((3, 2, 4, 4), np.inf)), "NaN or infinite"),
+    ],
+)
+def test_what_is_wrong_with_arrays_is_named(arrays, text, tmp_path):
+    path = tmp_path / "t.npz"
+    np.savez(path, **arrays)
+    with pytest.raises(af.InvalidInput, match=text) as error:
+        tracks = read_tracks(path)
+        for index in range(tracks.count):
+            tracks.handles(index, BOUNDS)
+    assert str(error.value).startswith(f"{path}: ")
+
+
+def test_archives_that_promise_too_much_or_are_cut_off(tmp_path):
+    path = tmp_path / "t.npz"
+    np.savez_compressed(path, **archive())
+    assert read_tracks(path).count == 3
+    whole = path.read_bytes()
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (1000000, 1000000, 4, 4), }"
+    header = header.ljust(117) + b"\n"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("frames.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header)
+    with pytest.raises(af.InvalidInput, match="does not fit its content"):
+        read_tracks(path)
+    for content in (b"", whole[:100], whole[:-30], io.BytesIO(whole).read(200) + whole[260:]):
+        path.write_bytes(content)
+        with pytest.raises(af.InvalidInput, match=r"t\.npz: "):
+            read_tracks(path)

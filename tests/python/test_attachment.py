@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points that a field carries along with a body, and rigid motions."""
+"""Points and rigid motions that a field carries along with a body."""
 
 import threading
 import time
@@ -11,6 +11,8 @@ from support.geometry.characters import FOOT, HIP, LEG, ring, trousers
 from support.oracles.energies import random_rotations
 
 import arapfields as af
+
+# Points that a field carries along with a body, and rigid motions.
 
 
 def length(samples):
@@ -240,3 +242,29 @@ def test_many_points_are_carried_at_interactive_rates(body):
     for field in shapes:
         attached.positions(field)
     assert (time.process_time() - start) / len(shapes) < 0.4  # processor time of all threads
+
+
+# What a body carries under a style: the field is steep off the surface, the frames are not.
+
+spatial = pytest.importorskip("scipy.spatial")
+
+SIZE = 0.97  # of the body, as attachments measure it
+MOST = 2.0  # times as long: what an edge becomes, where the surface below takes 1.6 to 2
+
+
+@pytest.fixture(scope="module")
+def styled():
+    body = af.sample_surface(trousers(), 5000, seed=0)
+    return body, af.stylize(body, "cube", up=[0, 0, 1])
+
+
+@pytest.mark.parametrize("share", [0.01, 0.02, 0.03, 0.04, 0.05])
+def test_clothes_at_any_distance_keep_together_under_a_style(styled, share):
+    body, field = styled
+    points = body.points[::2] + share * SIZE * body.normals[::2]
+    edges = spatial.cKDTree(points).query_pairs(0.02 * SIZE, output_type="ndarray")
+    before = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    long = before > 0.005 * SIZE
+    moved = af.Attachment(body, points).positions(field)
+    after = np.linalg.norm(moved[edges[:, 0]] - moved[edges[:, 1]], axis=1)
+    assert (after / before)[long].max() < MOST

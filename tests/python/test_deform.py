@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""deform: what it reaches, rigid motions, exact handles, options, bad input, cancelling, repeatability."""
+"""deform: what it reaches, handles, options, bad input, cancelling, repeatability."""
 
+import json
 import threading
 
 import numpy as np
 import pytest
+import trimesh
 from support import tolerances
-from support.geometry import cases
+from support.geometry import cases, meshes
+from support.geometry.meshes import sphere
+from support.programs.cli import run
 
 import arapfields as af
+
+# deform: what it reaches, rigid motions, exact handles, options, bad input, cancelling, repeatability.
 
 
 @pytest.fixture(scope="module")
@@ -269,3 +275,142 @@ def test_the_bunny_with_exact_handles(data_dir):
     report = af.deform(samples, cases.bunny_handles(), options).report
     assert report.energy <= 0.050 and report.handle_error_max <= tolerances.EXACT_HANDLE
     assert report.flipped_share == 0.0
+
+
+# The bending weight trades bend for stretch, monotonically.
+
+WEIGHTS = [0.0, 0.1, 1.0, 10.0]
+
+
+def check_trade(samples, handles, **options):
+    """Stretch rises and bend falls with the weight."""
+    fields = [af.deform(samples, handles, af.DeformOptions(bending=w, **options)) for w in WEIGHTS]
+    stretch, bend = np.transpose([af.arap_energy(field, samples.points) for field in fields])
+    assert (np.diff(bend) < 0).all(), (stretch, bend)
+    assert (np.diff(stretch) > 0).all(), (stretch, bend)
+
+
+def test_on_a_bar_by_bumps():
+    check_trade(cases.bar_samples(3000), cases.bar_handles(), field="radial", centers=150)
+
+
+@pytest.mark.slow
+def test_on_a_bar():
+    check_trade(cases.bar_samples(6000), cases.bar_handles(), width=128)
+
+
+@pytest.mark.slow
+def test_on_the_published_hand(data_dir):
+    samples = cases.published_samples(data_dir / "neural_sdf" / "hand.pt")
+    check_trade(samples, cases.hand_handles(), width=128)
+
+
+# Exact handles of a radial field: interpolated, at little more energy than soft ones.
+
+# A bend's energy with exact handles over that with soft ones, which may miss them.
+MOST_OVER_SOFT = 1.2
+
+
+def test_the_price_of_a_bar():
+    samples = cases.bar_samples(3000)
+    energies = [
+        af.deform(samples, cases.bar_handles(), af.DeformOptions(exact_handles=exact, centers=300)).report
+        for exact in (False, True)
+    ]
+    assert energies[1].handle_error_max < tolerances.EXACT_HANDLE
+    assert energies[0].energy < energies[1].energy < MOST_OVER_SOFT * energies[0].energy
+    assert energies[1].flipped_share == 0.0
+
+
+def test_many_centers_stay_in_their_range():
+    """Exact handles take more centers than were asked for, but never more than a solver can have."""
+    options = af.DeformOptions(exact_handles=True, centers=2300, iterations=1)
+    field = af.deform(cases.bar_samples(25_000), cases.bar_handles(), options)
+    assert field.report.handle_error_max < tolerances.EXACT_HANDLE
+
+
+# Point handles beside the surface: they move its nearest place and say so, or are refused.
+
+SHIFT = np.array([0.3, 0, 0])
+
+
+@pytest.mark.parametrize("off", [0.6, 1.2, 5.0])
+def test_a_point_off_the_surface_moves_it_and_says_so_or_is_refused(off):
+    """A ball of radius 1: within half its size of 2 a point stands for the surface's nearest place."""
+    directions = np.random.default_rng(0).normal(size=(800, 3))
+    ball = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    samples = af.SurfaceSamples(ball, ball)
+    rest = np.array([0, 0, 1 + off])
+    handles = [af.PointHandle([0, 0, -1], [0, 0, -1]), af.PointHandle(rest, rest + SHIFT)]
+    live = lambda: af.LiveDeformer(samples, handles).solve([[0, 0, -1], rest + SHIFT])  # noqa: E731
+    radial = lambda: af.deform(samples, handles, af.DeformOptions(field="radial"))  # noqa: E731
+    for solve in (live, radial):
+        if off > 1:
+            with pytest.raises(af.InvalidInput, match=r"handles\[1\]: its point lies .* away from it"):
+                solve()
+            continue
+        field = solve()
+        assert field([[0, 0, 1.0]])[0, 0] > 0.25
+        assert any("handles[1]" in note and "off the surface" in note for note in field.report.notes)
+
+
+def test_the_command_line_refuses_it_too(tmp_path, capsys):
+    trimesh.Trimesh(*sphere(1.0, 2), process=False).export(tmp_path / "ball.ply")
+    handles = [{"type": "point", "rest": [0, 0, 6], "target": [1, 0, 6]}]
+    (tmp_path / "handles.json").write_text(json.dumps(handles))
+    given = [tmp_path / "ball.ply", "--handles", tmp_path / "handles.json", "-o", tmp_path / "x.ply"]
+    assert run("deform", *given, "--field", "radial") == 2
+    assert "handles[0]: its point lies" in capsys.readouterr().err and not (tmp_path / "x.ply").exists()
+
+
+# Samples newly drawn from the surface at each step of a solve.
+
+
+def test_fresh_samples_are_drawn_from_the_surface():
+    V, F = meshes.torus(around=24, tube=12)
+    box = np.diag([0.4, 3.0, 3.0, 1.0])
+    here, moved = np.eye(4), np.eye(4)
+    here[0, 3], moved[0, 3] = -1.0, 1.0
+    lift = np.eye(4)
+    lift[2, 3] = 0.5
+    handles = [af.Cuboid(here @ box, here @ box), af.Cuboid(moved @ box, lift @ moved @ box)]
+    few = af.sample_mesh(V, F, count=300, seed=1)
+    settings = {"iterations": 12, "width": 16, "layers": 2, "seed": 3, "threads": 1}
+
+    def solve(samples, fresh):
+        return af.deform(samples, handles, af.DeformOptions(fresh_samples=fresh, **settings))(V)
+
+    assert not np.array_equal(solve(few, 100), solve(few, 0))
+    assert np.array_equal(solve(few, 100), solve(few, 100))
+    with pytest.raises(af.InvalidInput, match="fresh_samples"):
+        solve(af.SurfaceSamples(few.points, few.normals), 100)
+    with pytest.raises(af.InvalidInput, match="fresh_samples"):
+        solve(few, -1)
+
+
+# The published hand, whose fingers are close in space and far along the surface.
+
+# Fingers are a quarter of the cube apart: octaves from 4 to 128, whose bending a smaller weight must leave
+# room for, at a smaller rate.
+THIN_PARTS = dict(frequency=4.0, octaves=6, bending=0.1, bending_unit="cube", learning_rate=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_other_fingers_stay(data_dir, seed):
+    """The middle finger goes by a third of the hand's length, the other tips by less than 2 % of it."""
+    samples = cases.published_samples(data_dir / "neural_sdf" / "hand.pt")
+    length = np.ptp(samples.points[:, 2])
+    handles = cases.hand_handles()
+    assert np.linalg.norm(handles[1].target - handles[1].rest) > 0.3 * length
+    options = af.DeformOptions(width=128, iterations=600, seed=seed, **THIN_PARTS)
+    field = af.deform(samples, handles, options)
+    tips = cases.fingertips(samples)
+    tips.pop("middle")
+    for name, tip in tips.items():
+        assert len(tip) > 50
+        moved = np.linalg.norm(field(samples.points[tip]) - samples.points[tip], axis=1)
+        assert moved.max() < 0.02 * length, name
+    report = field.report
+    assert report.handle_error_max < 0.01 * length and report.flipped_share == 0.0
+    assert report.energy < 0.005

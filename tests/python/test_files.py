@@ -1,17 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Saved fields and signed distances: the layout of safetensors, and a reader that trusts nothing."""
+"""Saved fields, signed distances and archives: their layout, damage, and names of files and folders."""
 
 import copy
+import io
 import json
 import os
 import struct
+import zipfile
 
 import numpy as np
 import pytest
 import safetensors.numpy
 from support.files import archives
+from support.files.caches import random_motion, write
+from support.geometry.cases import bar_handles, bar_samples
+from support.programs.cli import run, write_octahedron
 
 import arapfields as af
+from arapfields._files import read_arrays, write_arrays
+from arapfields.point_cache import PointCacheReader
+
+# Saved fields and signed distances: the layout of safetensors, and a reader that trusts nothing.
 
 
 def refusal(path, content=None):
@@ -238,3 +247,147 @@ def test_reports_hold_what_json_holds(examples, tmp_path):
         sdf.save(tmp_path / "y")
     assert not (tmp_path / "y").exists()
     assert json.loads(archives.read(tmp_path / "x")[0]["kind"] and "{}") == {}
+
+
+# NumPy archives as files of poses, tracks and frames: what is damaged is refused, whatever NumPy raises.
+
+ARRAYS = {"points": np.arange(30.0).reshape(10, 3), "name": np.array("bent"), "count": np.array(3)}
+
+
+def written(compressed):
+    stream = io.BytesIO()
+    (np.savez_compressed if compressed else write_arrays)(stream, **ARRAYS)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_what_is_written_is_read(compressed, tmp_path):
+    (tmp_path / "a.npz").write_bytes(written(compressed))
+    for source in (written(compressed), tmp_path / "a.npz"):
+        found = read_arrays(source, set(ARRAYS))
+        assert found.keys() == ARRAYS.keys() and all((found[name] == ARRAYS[name]).all() for name in found)
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_every_damage_is_invalid_input_or_harmless(compressed):
+    content, random, refused = written(compressed), np.random.default_rng(1), 0
+    for at in range(len(content)):
+        changed = bytearray(content)
+        changed[at] ^= 1 << random.integers(8)
+        for damaged in (bytes(changed), content[:at]):
+            try:
+                read_arrays(damaged)
+            except af.InvalidInput as error:
+                refused += 1
+                assert str(error).startswith("the archive: ")
+    assert refused > len(content)
+
+
+def test_every_compression_is_read_or_refused():
+    for method in range(100):
+        changed = bytearray(written(True))
+        for signature, offset in ((b"PK\x03\x04", 8), (b"PK\x01\x02", 10)):
+            at = changed.find(signature)
+            while at >= 0:
+                changed[at + offset] = method
+                at = changed.find(signature, at + 1)
+        if method != zipfile.ZIP_DEFLATED:
+            with pytest.raises(af.InvalidInput):
+                read_arrays(bytes(changed))
+
+
+def test_sizes_of_arrays_are_checked_before_memory_is_asked_for():
+    for shape in ((10**15,), (10**9, 10**9), (-1,), (2,)):
+        stream = io.BytesIO()
+        with zipfile.ZipFile(stream, "w") as archive, archive.open("points.npy", "w") as entry:
+            np.lib.format.write_array_header_1_0(
+                entry, {"descr": "<f8", "fortran_order": False, "shape": shape}
+            )
+        with pytest.raises(af.InvalidInput, match="does not fit"):
+            read_arrays(stream.getvalue())
+
+
+def test_objects_and_other_names_are_refused(tmp_path):
+    stream = io.BytesIO()
+    np.savez(stream, points=np.array([{}], dtype=object))
+    with pytest.raises(af.InvalidInput):
+        read_arrays(stream.getvalue())
+    with pytest.raises(af.InvalidInput, match="unknown array 'name'"):
+        read_arrays(written(False), {"points", "count"})
+    with pytest.raises(OSError):
+        read_arrays(tmp_path / "none.npz")
+
+
+# Damage that no reader of numbers sees: a flipped bit anywhere in a saved file is refused.
+
+FLIPS = 60  # bits a kind of file
+
+
+def test_each_flipped_bit_is_seen(examples, tmp_path):
+    rng = np.random.default_rng(1)
+    for name, path in examples.items():
+        whole = path.read_bytes()
+        for bit in rng.integers(0, 8 * len(whole), FLIPS):
+            damaged = bytearray(whole)
+            damaged[bit // 8] ^= 1 << bit % 8
+            (tmp_path / path.name).write_bytes(damaged)
+            with pytest.raises(af.InvalidInput):
+                archives.load(tmp_path / path.name)
+                pytest.fail(f"{name}: bit {bit} of {8 * len(whole)}")
+
+
+def test_an_old_file_loads_and_a_new_one_needs_its_checksum(examples, tmp_path):
+    path = tmp_path / "radial.safetensors"
+    texts, arrays = archives.read(examples["radial"])
+    path.write_bytes(archives.packed(texts, arrays))  # version 1
+    points = np.random.default_rng(0).uniform(-1, 1, (20, 3))
+    assert np.array_equal(archives.load(path)(points), archives.load(examples["radial"])(points))
+    header = archives.header_of(texts, arrays)
+    for texts, message in (
+        ({"version": "2"}, "checksum: it is missing"),
+        ({"version": "2", "checksum": "12"}, "sixteen digits"),
+    ):
+        header["__metadata__"] |= texts
+        path.write_bytes(archives.joined(header, b"".join(array.tobytes() for array in arrays.values())))
+        with pytest.raises(af.InvalidInput, match=message):
+            archives.load(path)
+
+
+# Files in folders of any name: what is written is read again, by the library and by the command line.
+
+# Windows has 260 characters for paths, but for programs that say they take more, as Python and Blender do.
+FOLDERS = {
+    "spaces": "my files",
+    "umlauts": "Grüße Öl",
+    "Chinese": "模型 文件",
+    "long": "/".join(["x" * 60] * 5),
+}
+
+
+@pytest.fixture(params=FOLDERS)
+def folder(request, tmp_path):
+    path = tmp_path / FOLDERS[request.param]
+    path.mkdir(parents=True)
+    return path
+
+
+def test_what_is_written_is_read_again(folder):
+    field = af.deform(bar_samples(300), bar_handles(), af.DeformOptions(iterations=3))
+    field.save(folder / "ü 场.safetensors")
+    points = bar_samples(50).points
+    again = af.DeformationField.load(folder / "ü 场.safetensors")
+    assert np.array_equal(again(points), field(points))
+    motion = random_motion()
+    with PointCacheReader(write(folder / "é.pc2", motion)) as cache:
+        assert np.array_equal(cache[1], motion[1])
+    with pytest.raises(FileNotFoundError) as error:
+        af.DeformationField.load(folder / "不.safetensors")
+    assert "不.safetensors" in str(error.value)
+
+
+def test_the_command_line_takes_them(folder):
+    write_octahedron(folder / "ö.obj")
+    given = ["--iterations", "3", "--samples", "500", "--style", "cube"]
+    assert run("stylize", folder / "ö.obj", "-o", folder / "结果.ply", *given) == 0
+    assert (folder / "结果.ply").stat().st_size > 100
+    assert sorted(path.name for path in folder.iterdir()) == ["ö.obj", "结果.ply"]

@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Radial fields and the live solver on a bar, whose right answers are known."""
+"""Live deformation over a radial field."""
+
+import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
+import safetensors
+from support.geometry import cases, meshes
 from support.geometry.bar import LEFT, RIGHT, bar_samples, box, turned
+from support.geometry.cases import box as box_handle
+from support.geometry.cases import moved, published_samples, shift, turn
+from support.geometry.fork import BOTTOM, LEGS, TIP, fork_samples
 from support.oracles.energies import random_rotations
-from support.tolerances import LIVE_DRIFT, LIVE_IDENTITY, LIVE_ROUNDING, TRACKED
+from support.tolerances import LIVE_DRIFT, LIVE_IDENTITY, LIVE_KEEPS_UP, LIVE_ROUNDING, LIVE_WAY_BACK, TRACKED
 
 import arapfields as af
+
+# Radial fields and the live solver on a bar, whose right answers are known.
 
 QUICK = {"samples": 800, "coarse_centers": 30, "fine_centers": 120}
 
@@ -218,3 +228,257 @@ def test_tracked_points_are_the_fields(samples):
     assert live.tracked().dtype == np.float32 and live.tracked().shape == points.shape
     with pytest.raises(af.InvalidInput, match="points"):
         live.track(points[:, :2])
+
+
+# Ten thousand motions of a live bar; fingers of a published hand.
+
+
+def resident_mebibytes():
+    status = Path("/proc/self/status").read_text()
+    return int(status.split("VmRSS:")[1].split()[0]) / 1024
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="no /proc to read memory from")
+def test_ten_thousand_motions_leave_no_trace():
+    samples = bar_samples()
+    options = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=120, threads=1)
+    live, fresh = (
+        af.LiveDeformer(samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], options) for _ in range(2)
+    )
+    pose = [LEFT, turned(30) @ RIGHT]
+    expected = fresh.solve(pose, iterations=300, tolerance=1e-9)(samples.points[:500])
+    rng = np.random.default_rng(0)
+    for i in range(10000):
+        angles, offset = 25 * rng.normal(size=3), 0.3 * rng.normal(size=3)
+        motion = turned(angles[0], 0) @ turned(angles[1], 1) @ turned(angles[2], 2, offset)
+        live.solve([LEFT, motion @ RIGHT])
+        assert np.isfinite(live.report.value) and np.isfinite(live.report.handle_error_max)
+        if i == 1000:
+            memory = resident_mebibytes()
+    assert resident_mebibytes() < memory + 2
+    shape = live.solve(pose, iterations=300, tolerance=1e-9)(samples.points[:500])
+    assert np.abs(shape - expected).max() < LIVE_DRIFT * 4  # the bar is 4 long
+    live.reset()
+    assert np.abs(live.field(samples.points) - samples.points).max() < 1e-8
+
+
+def test_a_finger_of_a_hand_moves_nearly_alone(data_dir):
+    """The middle finger turned aside by 25 degrees, the palm held: how far the other fingertips go, by the
+    hand's length (1.48)."""
+    samples = published_samples(data_dir / "neural_sdf" / "hand.pt")
+    palm, finger = box_handle([-1, -1, -1], [0.1, 1, 0.03]), box_handle([0, -0.2, 0.62], [0.4, 0.08, 0.9])
+    tips = np.array([[0.33, -0.38, 0.1], [0.22, -0.27, 0.56], [0.24, 0.18, 0.62], [0.16, 0.37, 0.35]])
+    handles = [moved(palm), moved(finger, turn([1, 0, 0], -25, (-0.1, -0.05, 0.05)))]
+    shares, energies = [], []
+    for interior in (True, False):
+        live = af.LiveDeformer(samples, handles, af.LiveOptions(interior=interior))
+        field = live.solve()
+        shares.append(np.linalg.norm(field(tips) - tips, axis=1).max() / 1.48)
+        energies.append(live.report.energy)
+    assert shares[0] < 0.05 < 0.1 < shares[1]
+    assert energies[0] < 0.5 * energies[1]
+
+
+def test_refined_by_a_style_and_handles_at_once():
+    """Strength, sharpness and orientation of a style move while a handle does; no set-up is made anew."""
+    samples = bar_samples()
+    live = af.LiveDeformer(
+        samples,
+        [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)],
+        af.LiveOptions(samples=800, coarse_centers=30, fine_centers=120, bending=0.1, gauss_weight=2.0),
+    )
+    cube = af.preferred_normals("cube")
+    for i in range(1, 6):
+        live.set_style(cube @ turned(4.0 * i, 0)[:3, :3].T, strength=0.2 * i, sharpness=4 + 0.4 * i)
+        live.solve([LEFT, turned(5.0 * i) @ RIGHT])
+        assert live.report.flipped_share == 0 and live.report.handle_error_mean < 0.05
+    setup = live.report.setup_seconds
+    live.solve(iterations=60)
+    assert live.report.setup_seconds == setup
+    alone = af.LiveDeformer(samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, turned(25) @ RIGHT)])
+    plain = alone.solve(iterations=60)
+    twisted = af.gauss_preference(samples.normals, cube @ turned(20.0, 0)[:3, :3].T).mean()
+    assert live.report.preference > twisted + 0.05
+    assert np.abs(live.field(samples.points) - plain(samples.points)).max() > 0.02
+
+
+# Following a drag: shapes without fields, few steps each, and solves that are cancelled.
+
+
+def quick_deformer(surface):
+    quick = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=120)
+    return af.LiveDeformer(surface, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], quick)
+
+
+def test_following_is_solving_without_a_field(samples):
+    solved, followed = quick_deformer(samples), quick_deformer(samples)
+    points = samples.points[:200]
+    for live in (solved, followed):
+        live.track(points)
+    for degrees in (10, 25, 40):
+        field = solved.solve([LEFT, turned(degrees) @ RIGHT])
+        taken = followed.follow([LEFT, turned(degrees) @ RIGHT])
+        assert taken == field.report.iterations > 0
+        assert np.array_equal(solved.tracked(), followed.tracked())
+    a, b = solved.report.to_dict(), followed.report.to_dict()
+    assert {k: v for k, v in a.items() if "seconds" not in k} == {
+        k: v for k, v in b.items() if "seconds" not in k
+    }
+    with pytest.raises(af.InvalidInput, match="iterations"):
+        followed.follow(iterations=-1)
+
+
+def test_three_steps_a_pose_keep_up_with_a_drag(samples):
+    """Each begins where the last one ended: they are behind by a part of what one step of it moves."""
+    points = samples.points[::40]
+    fine, live = quick_deformer(samples), quick_deformer(samples)
+    behind, steps, before = [], [], points
+    for degrees in range(2, 62, 2):
+        pose = [LEFT, turned(degrees) @ RIGHT]
+        best = fine.solve(pose, iterations=100, tolerance=1e-6)(points)
+        live.follow(pose, iterations=3)
+        behind.append(np.abs(live.field(points) - best).max())
+        steps.append(np.abs(best - before).max())
+        before = best
+    assert np.mean(behind) < LIVE_KEEPS_UP * np.mean(steps)
+
+
+def test_a_solve_goes_on_rightly_after_one_that_was_cancelled(samples):
+    """Between two steps the coefficients have moved: what was measured before must not serve again."""
+    live = af.LiveDeformer(
+        samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], af.LiveOptions(samples=6000)
+    )
+    live.solve()
+    task = af.Task()
+
+    def cancel():
+        while task.progress < 2 / 400:
+            pass
+        task.cancel()
+
+    watcher = threading.Thread(target=cancel)
+    watcher.start()
+    with pytest.raises(af.Cancelled):
+        while True:
+            for degrees in (60, -60):
+                live.solve([LEFT, turned(degrees) @ RIGHT], iterations=400, tolerance=1e-4, task=task)
+    watcher.join()
+    field = live.solve([LEFT, turned(40) @ RIGHT], tolerance=1e-4)
+    stretch, _ = af.arap_energy(field, samples.points)
+    assert field.report.stretch == pytest.approx(stretch, rel=0.05)
+
+
+def test_a_solve_after_a_cancelled_step_has_no_inertia(samples):
+    live = quick_deformer(samples)
+    live.set_secondary_motion(af.SecondaryMotionOptions())
+    live.step([LEFT, turned(10) @ RIGHT], 1 / 24)
+    state, task = live.motion_state, af.Task()
+    settled = live.solve([LEFT, RIGHT])(samples.points)
+    live.motion_state = state
+    timer = threading.Timer(0.05, task.cancel)
+    timer.start()
+    with pytest.raises(af.Cancelled):
+        live.step([LEFT, turned(40) @ RIGHT], 10.0, task=task)
+    timer.join()
+    assert np.array_equal(live.solve([LEFT, RIGHT])(samples.points), settled)
+
+
+def test_a_drag_comes_back_as_it_went(data_dir):
+    """Measurements that are updated from solve to solve stay those of the coefficients."""
+    samples = cases.published_samples(data_dir / "neural_sdf" / "bunny.pt", 3000)
+    held, moved = cases.bunny_handles()
+    rests = [af.Cuboid(handle.rest, handle.rest) for handle in (held, moved)]
+    live, fresh = af.LiveDeformer(samples, rests), af.LiveDeformer(samples, rests)
+    for degrees in [*range(0, 70, 2), *range(70, 8, -2)]:
+        pose = [held.rest, cases.turn([0, 1, 0], degrees, (-0.1, 0, 0.3)) @ moved.rest]
+        live.solve(pose)
+        if degrees % 20 == 10:
+            fresh.solve(pose, iterations=40)
+            assert live.report.value <= LIVE_WAY_BACK * fresh.report.value, degrees
+
+
+# Live deformation of parts that are near in space but apart along the shape.
+
+# Single precision, of coefficients that nearly cancel between the layers of centers.
+SINGLE = 1e-4
+# A step of a handle: what it pulls at is never farther from where it goes.
+LEFT_BEHIND = 0.02
+
+
+@pytest.fixture(scope="module")
+def fork():
+    return fork_samples()
+
+
+def other_leg_moves(samples, interior):
+    """Distance by which the left tip moves when the right one is pulled aside, and the live deformer."""
+    handles = [af.Cuboid(BOTTOM, BOTTOM), af.Cuboid(TIP, TIP)]
+    live = af.LiveDeformer(samples, handles, af.LiveOptions(interior=interior))
+    field = live.solve([BOTTOM, shift([0, 0.4, 0]) @ TIP], iterations=100, tolerance=1e-6)
+    assert live.report.handle_error_mean < 0.01
+    return np.linalg.norm(field(LEGS[-1]) - LEGS[-1]), live
+
+
+def test_a_leg_of_a_fork_moves_alone(fork):
+    apart, live = other_leg_moves(fork, True)
+    together, plain = other_leg_moves(fork, False)
+    assert apart < 0.04 * 1.5  # of the fork's length
+    assert together > 2 * apart
+    assert live.report.energy < plain.report.energy
+
+
+def test_derivatives_and_files_of_such_a_field(fork, tmp_path):
+    _, live = other_leg_moves(fork, True)
+    field = live.field
+    rng = np.random.default_rng(3)
+    points = np.r_[fork.points[:40], rng.uniform(-0.6, 0.6, size=(40, 3)), [[5.0, 5, 5]]]
+    step = 2e-6
+    for k in range(3):
+        offset = step * np.eye(3)[k]
+        slope = (field(points + offset) - field(points - offset)) / (2 * step)
+        jacobian, hessian = field.jacobian(points), field.hessian(points)
+        assert np.abs(slope - jacobian[:, :, k]).max() < 1e-6
+        slope = (field.jacobian(points + offset) - field.jacobian(points - offset)) / (2 * step)
+        assert np.abs(slope - hessian[:, :, :, k]).max() < 1e-5 * np.abs(hessian).max()
+    field.save(tmp_path / "fork.safetensors")
+    again = af.DeformationField.load(tmp_path / "fork.safetensors")
+    assert np.array_equal(again(points), field(points))
+    assert np.array_equal(again.hessian(points), field.hessian(points))
+    live.track(points)
+    assert np.abs(live.tracked() - field(points)).max() < SINGLE
+    live.reset()
+    assert np.abs(live.field(points) - points).max() < 1e-8
+
+
+def test_a_convex_shape_needs_no_lift(fork, tmp_path):
+    for surface, embedded in ((bar_samples(), False), (fork, True)):
+        live = af.LiveDeformer(surface, [af.Point(surface.points[0], surface.points[0])])
+        live.field.save(tmp_path / "field.safetensors")
+        with safetensors.safe_open(tmp_path / "field.safetensors", "np") as saved:
+            names = list(saved.keys())
+        assert any(name.startswith("embedding.") for name in names) == embedded
+
+
+def test_loose_parts_stay_together():
+    """Two balls that do not touch: what nothing joins is joined by the shortest line, and follows."""
+    rng = np.random.default_rng(5)
+    normals = rng.normal(size=(6000, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    points = 0.5 * normals + np.where(np.arange(6000) < 3000, -0.6, 0.6)[:, None] * [1.0, 0, 0]
+    live = af.LiveDeformer(af.SurfaceSamples(points, normals), [af.Point([-1.1, 0, 0], [-1.1, 0, 0])])
+    field = live.solve([[-1.1, 0.5, 0]], iterations=100)
+    assert np.abs(field(points) - points - [0, 0.5, 0]).max() < 0.05
+
+
+def test_a_held_speck_beside_a_ball_swings_with_it():
+    """Chosen by chance, none of the samples that the handle pulls at would be of it."""
+    ball, speck = meshes.sphere(1.0, 4), meshes.box((0.01, 0.01, 0.01))
+    v = np.concatenate([ball[0], speck[0] + [0.0, 0.0, 2.0]])
+    samples = af.sample_mesh(v, np.concatenate([ball[1], speck[1] + len(ball[0])]), count=6000, seed=2)
+    live = af.LiveDeformer(samples, [af.Region(list(range(6000)), np.eye(4), np.eye(4))])
+    live.set_secondary_motion(af.SecondaryMotionOptions())
+    for step in range(1, 9):
+        way = [0.02 * step, 0.0, 0.0]
+        moved = live.step([shift(way)], 1 / 24)(v)
+        assert np.linalg.norm(moved - v - way, axis=1).max() < LEFT_BEHIND

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reports: one frozen class for each kind, the same from attributes, by name, as a dict and from a file."""
+"""Reports: their classes, their notes, and the measures of a mesh."""
 
 import dataclasses
 import json
@@ -8,10 +8,14 @@ import pickle
 import numpy as np
 import pytest
 from support.geometry import cases
+from support.geometry.cases import box, moved, turn
 from support.geometry.meshes import sphere
+from support.programs.cli import HELD_AND_SHIFTED, SMALL_SOLVE, run, write_octahedron
 
 import arapfields as af
 from arapfields import _report_files
+
+# Reports: one frozen class for each kind, the same from attributes, by name, as a dict and from a file.
 
 FIT = dict(iterations=150, width=32, layers=2, batch=256, near_points=5000, uniform_points=1000)
 
@@ -165,3 +169,106 @@ def test_a_report_s_fields_are_read_with_their_types(name, value):
     assert type(read.error_max) is float and np.isnan(read.seconds)
     with pytest.raises(ValueError, match=f"does not fit: {name}"):
         _report_files.from_json(json.dumps({**told, name: value}))
+
+
+# What a report notes on a result that should not be used unseen, and where the notes are shown.
+
+QUICK = dict(width=32, layers=3, iterations=60, batch=100, handle_batch=50)
+
+
+@pytest.mark.parametrize("kind", ["radial", "neural"])
+def test_folds_and_far_targets_are_noted(kind):
+    samples = cases.bar_samples()
+    left, right = (h.rest for h in cases.bar_handles())
+
+    def solve(way):
+        handles = [cases.moved(left), cases.moved(right, cases.shift([way, 0.0, 0.0]))]
+        return af.deform(samples, handles, af.DeformOptions(field=kind, **QUICK)).report
+
+    assert solve(0.1).notes == () and solve(0.1).far_target is None
+    torn = solve(-800.0)  # 500 times its length, through itself
+    assert torn.flipped_share > 0.0
+    folds, far = torn.notes
+    assert f"{100 * torn['flipped_share']:.3g} %" in folds and f"{torn['min_determinant']:.3g}" in folds
+    assert far.startswith("handles[1]") and f"{torn['far_target']:.3g} times" in far
+    assert torn.far_target == pytest.approx(500.0, rel=0.01)
+
+
+def test_live_notes_come_and_go():
+    left, right = (h.rest for h in cases.bar_handles())
+    live = af.LiveDeformer(cases.bar_samples(), [cases.moved(left), cases.moved(right)])
+    live.solve([left, cases.shift([-800.0, 0.0, 0.0]) @ right])
+    assert any("handles[1]" in note for note in live.report.notes)
+    live.reset()
+    live.solve([left, right])
+    assert live.report.notes == ()
+
+
+def test_notes_are_printed(tmp_path, capsys):
+    write_octahedron(tmp_path / "mesh.obj")
+    far = [*HELD_AND_SHIFTED[:-1], "-900,0,0", "-o", tmp_path / "torn.ply", *SMALL_SOLVE]
+    assert run("deform", tmp_path / "mesh.obj", *far) == 0
+    shown = capsys.readouterr()
+    assert "note: handles[1]: its target is 4" in shown.err and "note:" not in shown.out
+    assert run("deform", tmp_path / "mesh.obj", *far, "--quiet") == 0
+    assert capsys.readouterr().err == ""
+
+
+# The report tells what happens to the mesh's own triangles, not to samples alone.
+
+
+def strips(columns):
+    """A bar along x from −1 to 1 whose long sides have so many columns of triangles."""
+    x = np.linspace(-1.0, 1.0, columns + 1)
+    ring = 0.15 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    vertices = np.array([(a, *p) for a in x for p in ring])
+    faces = []
+    for i in range(columns):
+        for k in range(4):
+            a, b = 4 * i + k, 4 * i + (k + 1) % 4
+            faces += [(a, b + 4, b), (a, a + 4, b + 4)]
+    end = 4 * columns
+    faces += [(0, 1, 2), (0, 2, 3), (end, end + 2, end + 1), (end, end + 3, end + 2)]
+    return vertices, np.array(faces)
+
+
+def bent(vertices, triangles, degrees, pivot=(0.0, 0.0, 0.0)):
+    ends = [
+        moved(box((-1.1, -0.3, -0.3), (-0.8, 0.3, 0.3))),
+        moved(box((0.8, -0.3, -0.3), (1.1, 0.3, 0.3)), turn((0, 0, 1), degrees, pivot)),
+    ]
+    return af.deform(af.sample_mesh(vertices, triangles), ends)
+
+
+def test_a_fine_bar_is_bent_without_a_note():
+    assert bent(*strips(40), 60.0).report.notes == ()
+
+
+def test_stretches_of_the_mesh_s_own_triangles_are_in_the_report():
+    vertices, triangles = strips(24)
+    field = bent(vertices, triangles, 80.0)
+    stretches = np.linalg.svd(field.jacobian(vertices[triangles].mean(axis=1)), compute_uv=False)
+    rounding = 1e-9
+    assert field.report.max_stretch >= stretches.max() - rounding
+    assert field.report.min_determinant <= np.prod(stretches, axis=1).min() + rounding
+
+
+def test_triangles_too_long_for_the_motion_are_told_of_with_a_place():
+    # Slivers that reach along the whole bar, in a plane: its one end comes round to behind the other one.
+    vertices, triangles = strips(40)
+    rows = np.linspace(-0.15, 0.15, 30)
+    extra = np.array([(side, y, 0.15) for y in rows for side in (-1.0, 1.0)])
+    start = len(vertices)
+    slivers = [(start + 2 * i, start + 2 * i + 1, start + 2 * i + 2) for i in range(29)]
+    field = bent(np.vstack([vertices, extra]), np.vstack([triangles, slivers]), 140.0, (-0.3, 0.0, 0.0))
+    mesh_vertices, mesh_triangles = np.vstack([vertices, extra]), np.vstack([triangles, slivers])
+    corners = field.apply(mesh_vertices, triangles=mesh_triangles)[mesh_triangles]
+    rest = mesh_vertices[mesh_triangles]
+    before = np.cross(rest[:, 1] - rest[:, 0], rest[:, 2] - rest[:, 0])
+    after = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    jacobians = field.jacobian(rest.mean(axis=1))
+    expected = np.einsum("nji,nj->ni", np.linalg.inv(jacobians), before)
+    turned = (np.linalg.det(jacobians) > 0) & ((expected * after).sum(axis=1) < 0)
+    told = [note for note in field.report.notes if "turn over" in note]
+    assert turned.sum() > 0.002 * len(mesh_triangles)
+    assert told[0].startswith(f"{turned.sum()} of {len(mesh_triangles)} triangles turn over")

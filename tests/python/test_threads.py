@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The library's own threads: a number for each call, the same results for all; libtorch's are left alone."""
+"""Threads of the library, of callers and of other processes."""
 
+import importlib.util
 import os
 import subprocess
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.geometry.cases import bar_handles, bar_samples
 from support.geometry.meshes import torus
+from support.tolerances import BUSY_SLOWDOWN
 
 import arapfields as af
+from arapfields._locks import lock, unlock
+
+# The library's own threads: a number for each call, the same results for all; libtorch's are left alone.
 
 COUNTS = (1, 2, 3, 5)
 TESTS = str(Path(__file__).parents[1])
@@ -237,3 +243,128 @@ def test_no_variable_of_the_environment_is_touched():
         run_script("import os; before = dict(os.environ); import arapfields; print(before == os.environ)")
         == "True"
     )
+
+
+# Beside as many busy processes as there are processors, a call takes little more than twice as long.
+
+BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "busy.py"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["deform", "live"])
+@pytest.mark.parametrize("first", ["torch", "arapfields"])
+def test_other_processes_cost_their_share_alone(name, first):
+    spec = importlib.util.spec_from_file_location("busy", BENCHMARK)
+    busy = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(busy)
+    *_, ratio = busy.slowdown(name, first)
+    assert ratio <= BUSY_SLOWDOWN
+
+
+# The end of a process whose daemon threads are at work in the library: the exit code is the script's own.
+
+BEGIN = """
+import sys, tempfile, threading, time
+import numpy as np
+import arapfields as af
+points = np.random.default_rng(0).normal(size=(1000, 3))
+points /= np.linalg.norm(points, axis=1, keepdims=True)
+samples = af.SurfaceSamples(points, points)
+handles = [af.PointHandle([0, 0, -1], [0, 0, -1]), af.PointHandle([0, 0, 1], [0.5, 0, 1])]
+network = af.DeformOptions(field="neural", iterations=1000, width=8, layers=1)
+began = threading.Event()
+
+def spend_time(*_):
+    began.set()
+    return sum(range(1000))
+"""
+LOOPS = {
+    "live solves": """
+live = af.LiveDeformer(samples, handles, af.LiveOptions(
+    samples=60, coarse_centers=4, fine_centers=12, iterations=2, interior=False, threads=1))
+def turn():
+    live.solve([[0, 0, -1.0], [0.1, 0, 1.0]])
+    began.set()
+""",
+    "callback": """
+def turn():
+    af.deform(samples, handles, network, callback=spend_time)
+""",
+    "callback that stops": """
+def stop(_):
+    spend_time()
+    raise StopIteration
+def turn():
+    af.deform(samples, handles, network, callback=stop)
+""",
+    "energy": """
+def energy(jets):
+    spend_time()
+    return (float((jets.values**2).mean()),)
+def turn():
+    af.deform(samples, handles, network, energies=[energy])
+""",
+    "implicit function": """
+class Ball(af.ImplicitFunction):
+    def __call__(self, points):
+        spend_time()
+        return np.linalg.norm(points, axis=1) - 0.5
+    @property
+    def gradient_bound(self):
+        spend_time()
+        return 1.0
+def turn():
+    af.extract_surface(Ball(), 16)
+""",
+    "saved fields": """
+field = af.deform(samples, handles, af.DeformOptions(iterations=1))
+folder = tempfile.mkdtemp()
+def turn():
+    field.save(f"{folder}/{threading.get_ident()}")
+    field.report
+    began.set()
+""",
+}
+END = """
+def loop():
+    while True:
+        turn()
+for _ in range(2):
+    threading.Thread(target=loop, daemon=True).start()
+began.wait(30)
+time.sleep(0.05)
+sys.exit(3)
+"""
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_daemon_threads_at_work_leave_the_exit_code(loop):
+    for _ in range(2):
+        command = [sys.executable, "-c", BEGIN + LOOPS[loop] + END]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        assert ended.returncode == 3, ended.stderr[-2000:]
+
+
+# Locks on bytes of a file: threads of one process, and another process.
+
+THREADS, ROUNDS = 8, 100
+LOCK_ALL = """
+import sys
+from arapfields._locks import lock
+file = open(sys.argv[1], "ab")
+for byte in range(int(sys.argv[2])):
+    lock(file, byte, wait=False)
+"""
+
+
+def test_threads_lock_bytes_of_one_file_and_leave_none_locked(tmp_path):
+    with (tmp_path / "lock").open("ab") as file, ThreadPoolExecutor(THREADS) as pool:
+
+        def work(byte):
+            for _ in range(ROUNDS):
+                lock(file, byte, wait=False)
+                unlock(file, byte)
+
+        list(pool.map(work, range(THREADS)))
+        command = [sys.executable, "-c", LOCK_ALL, str(file.name), str(THREADS)]
+        assert subprocess.run(command, timeout=60).returncode == 0

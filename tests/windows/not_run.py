@@ -11,19 +11,19 @@ LINKS = "Wine makes no symbolic links"
 BACKWARD = "PyTorch's backward pass ends with an exception of its own under Wine"
 
 PYTHON = {
-    "test_limits.py::test_objects_without_init_are_refused": LIMITS,
-    "test_limits.py::test_none_is_no_object": LIMITS,
-    "test_limits.py::test_arrays_that_cannot_be_copied_are_named": LIMITS,
-    "test_limits.py::test_sizes_that_memory_cannot_hold_are_named": LIMITS,
-    "test_limits.py::test_a_sparse_file_asks_for_no_memory": LIMITS,
-    "test_array_arguments.py::test_no_argument_asks_for_memory_that_is_not_there": LIMITS,
+    "test_arguments.py::test_objects_without_init_are_refused": LIMITS,
+    "test_arguments.py::test_none_is_no_object": LIMITS,
+    "test_arguments.py::test_arrays_that_cannot_be_copied_are_named": LIMITS,
+    "test_arguments.py::test_sizes_that_memory_cannot_hold_are_named": LIMITS,
+    "test_arguments.py::test_a_sparse_file_asks_for_no_memory": LIMITS,
+    "test_arguments.py::test_no_argument_asks_for_memory_that_is_not_there": LIMITS,
     "test_animate.py::test_a_disk_that_is_full_for_usd_is_named": LIMITS,
     "test_outputs.py::test_a_full_disk_is_named_and_changes_nothing": LIMITS,
     "test_outputs.py::test_verbs_on_a_full_disk": LIMITS,
     "test_point_cache.py::test_memory_does_not_grow_with_the_frames": LIMITS,
-    "test_point_cache_damage.py::test_a_disk_that_fills_meanwhile_is_named": LIMITS,
-    "test_interrupt.py::test_ctrl_c": CTRL_C,
-    "test_cli_errors.py::test_interrupt_cancels_and_leaves_nothing": CTRL_C,
+    "test_point_cache.py::test_a_disk_that_fills_meanwhile_is_named": LIMITS,
+    "test_tasks.py::test_ctrl_c": CTRL_C,
+    "test_cli.py::test_interrupt_cancels_and_leaves_nothing": CTRL_C,
     "test_outputs.py::test_only_regular_files_are_written[pipe]": KINDS,
     "test_outputs.py::test_only_regular_files_are_written[device]": KINDS,
     "test_outputs.py::test_only_regular_files_are_written[socket]": KINDS,
@@ -34,7 +34,7 @@ PYTHON = {
     "test_threads.py::test_no_thread_of_another_s_is_started": PROC,
     "test_threads.py::test_after_a_call_torch_still_uses_its_threads": PROC,
     "test_threads.py::test_threads_that_the_system_refuses_are_done_without": LIMITS,
-    "test_jets.py::test_jets_and_parameter_gradients_equal_autograd": BACKWARD,
+    "test_networks.py::test_jets_and_parameter_gradients_equal_autograd": BACKWARD,
     "test_invertible.py::test_jets_and_pull_back_equal_autograd": BACKWARD,
 }
 BLENDER = {
