@@ -2,14 +2,18 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <boost/test/unit_test.hpp>
+#include <cmath>
 #include <map>
 #include <numbers>
 
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "distance/signed_distance.h"
 #include "extraction/batch_function.h"
+#include "extraction/extract_deformed.h"
 #include "extraction/extract_surface.h"
+#include "extraction/thin_parts.h"
 #include "implicit_shapes.h"
 
 using namespace arapfields;
@@ -303,5 +307,216 @@ BOOST_AUTO_TEST_CASE(frame_cancel_and_bad_input) {
   extract_surface(shape, 64, Progress(&watched));
   BOOST_TEST(watched.progress() == 1.0);
 }
+
+BOOST_AUTO_TEST_SUITE(deformed)
+
+namespace {
+
+/// A bend of the cube about y: x becomes the angle around an axis at z = −1/curvature. Its inverse is known.
+class Bend final : public DeformationField {
+ public:
+  explicit Bend(double curvature, bool backwards = false) : curvature_(curvature), backwards_(backwards) {}
+
+  void evaluate(PointsIn points, JetView<double> out) const override {
+    for (Index p = 0; p < points.rows(); ++p) {
+      const double x = points(p, 0), y = points(p, 1), z = points(p, 2), center = 1.0 / curvature_;
+      double* value = out.at(0, p);
+      if (backwards_) {
+        const double radius = std::hypot(x, z + center);
+        value[0] = center * std::atan2(x, z + center), value[1] = y, value[2] = radius - center;
+        continue;
+      }
+      const double angle = curvature_ * x, radius = z + center, s = std::sin(angle), c = std::cos(angle);
+      value[0] = radius * s, value[1] = y, value[2] = radius * c - center;
+      if (out.order == JetOrder::value) continue;
+      const double columns[3][3] = {
+          {curvature_ * radius * c, 0.0, -curvature_ * radius * s}, {0.0, 1.0, 0.0}, {s, 0.0, c}};
+      for (int j = 0; j < 3; ++j) std::copy_n(columns[j], 3, out.at(first_column(j), p));
+    }
+  }
+
+ private:
+  double curvature_;
+  bool backwards_;
+};
+
+/// A field that is NaN everywhere.
+class Nowhere final : public DeformationField {
+ public:
+  void evaluate(PointsIn points, JetView<double> out) const override {
+    std::fill_n(out.data, 3 * points.rows(), std::nan(""));
+  }
+};
+
+double apart(const TriangleMesh& a, const TriangleMesh& b) {
+  Vector forth(a.vertices.rows()), back(b.vertices.rows());
+  SignedDistance(b.vertices, b.triangles).unsigned_distance(a.vertices, forth);
+  SignedDistance(a.vertices, a.triangles).unsigned_distance(b.vertices, back);
+  return std::max(forth.maxCoeff(), back.maxCoeff());
+}
+
+TriangleMesh warped(const ImplicitFunction& shape, const DeformationField& field, int n) {
+  TriangleMesh mesh = extract_surface(shape, n);
+  Points moved(mesh.vertices.rows(), 3);
+  field.evaluate(field.frame().to_cube(mesh.vertices), {moved.data(), moved.rows(), JetOrder::value});
+  mesh.vertices = field.frame().to_mesh(moved);
+  return mesh;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(equals_the_moved_surface_by_either_inverse) {
+  const auto bar = shapes::box(Vec3(0.8, 0.2, 0.15));
+  const Bend bend(1.2), back(1.2, true);
+  const TriangleMesh moved = warped(bar, bend, 64);
+  for (const DeformationField* inverse :
+       {static_cast<const DeformationField*>(nullptr), static_cast<const DeformationField*>(&back)}) {
+    DeformedReport report;
+    const TriangleMesh mesh = extract_deformed(bar, bend, inverse, 64, {}, &report);
+    BOOST_TEST(apart(mesh, moved) < 1.5 * 2.0 / 63);
+    BOOST_TEST(report.failures == 0);
+    BOOST_TEST(report.inverted < report.dense_evaluations / 4);
+    BOOST_TEST(!report.open);
+    Vector inside(1);
+    SignedDistance(mesh.vertices, mesh.triangles).evaluate(Points::Zero(1, 3), inside);
+    BOOST_TEST(inside[0] < -0.1);
+  }
+}
+
+BOOST_AUTO_TEST_CASE(vertices_lie_on_the_surface) {
+  // Each vertex's rest position is where Φ is zero up to the interpolation within a cell.
+  const auto ball = shapes::sphere(0.5);
+  const Bend bend(0.8), back(0.8, true);
+  DeformedReport report;
+  const TriangleMesh mesh = extract_deformed(ball, bend, nullptr, 72, {}, &report);
+  Points rest(mesh.vertices.rows(), 3);
+  back.evaluate(mesh.vertices, {rest.data(), rest.rows(), JetOrder::value});
+  const double worst = (rest.rowwise().norm().array() - 0.5).abs().maxCoeff();
+  BOOST_TEST(worst < report.spacing * report.spacing / 0.5);
+}
+
+BOOST_AUTO_TEST_CASE(frames_may_differ) {
+  auto ball = shapes::sphere(0.6);
+  ball.place = {Vec3(3, 0, 0), 2.0};
+  Bend bend(0.5);
+  bend.set_frame({Vec3(3, 0, 1), 4.0});
+  const TriangleMesh moved = warped(ball, bend, 48);
+  DeformedReport report;
+  const TriangleMesh mesh = extract_deformed(ball, bend, nullptr, 48, {}, &report);
+  BOOST_TEST(apart(mesh, moved) < 1.5 * report.spacing);
+}
+
+BOOST_AUTO_TEST_CASE(progress_cancel_and_bad_input) {
+  const auto ball = shapes::sphere(0.5);
+  const Bend bend(0.8);
+  BOOST_CHECK_THROW(extract_deformed(ball, bend, nullptr, 7), InvalidInput);
+  BOOST_CHECK_THROW(extract_deformed(ball, Nowhere(), nullptr, 32), InvalidInput);
+  Task task, watched;
+  task.cancel();
+  BOOST_CHECK_THROW(extract_deformed(ball, bend, nullptr, 32, Progress(&task)), Cancelled);
+  extract_deformed(ball, bend, nullptr, 32, Progress(&watched));
+  BOOST_TEST(watched.progress() == 1.0);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+BOOST_AUTO_TEST_SUITE(thin_parts)
+
+namespace {
+
+/// Two balls, and a thin slanting rod between them: a distance but where they meet.
+shapes::Analytic dumbbell(double radius, const Vec3& half_way = Vec3(0.52, 0.31, 0.23)) {
+  shapes::Analytic shape([=](const Vec3& x) {
+    const double along = std::clamp(x.dot(half_way) / half_way.squaredNorm(), -1.0, 1.0);
+    const double rod = (x - along * half_way).norm() - radius;
+    return std::min(
+        {rod, shapes::sphere_distance(x, half_way, 0.22), shapes::sphere_distance(x, -half_way, 0.22)});
+  });
+  shape.bound = 1.0;
+  return shape;
+}
+
+void check_closed(const TriangleMesh& mesh) {
+  std::map<std::pair<int, int>, std::pair<int, int>> edges;
+  std::map<int, std::map<int, int>> next;  // around each vertex
+  for (Index t = 0; t < mesh.triangles.rows(); ++t)
+    for (int c = 0; c < 3; ++c) {
+      const int a = mesh.triangles(t, c), b = mesh.triangles(t, (c + 1) % 3);
+      auto& uses = edges[{std::min(a, b), std::max(a, b)}];
+      ++(a < b ? uses.first : uses.second);
+      next[a][b] = mesh.triangles(t, (c + 2) % 3);
+    }
+  Index bad = 0;
+  for (const auto& [edge, uses] : edges) bad += uses.first != 1 || uses.second != 1;
+  BOOST_TEST(bad == 0);
+  Index pinched = 0;  // vertices whose triangles are not one fan
+  for (const auto& [vertex, steps] : next) {
+    std::size_t length = 0;
+    int at = steps.begin()->first;
+    do {
+      at = steps.at(at);
+      ++length;
+    } while (at != steps.begin()->first && length <= steps.size());
+    pinched += length != steps.size();
+  }
+  BOOST_TEST(pinched == 0);
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(what_comes_apart_is_named_and_a_resolution_that_holds_it) {
+  for (const auto known : {true, false}) {
+    auto shape = dumbbell(0.012);
+    if (!known) shape.bound.reset();
+    ExtractionReport report;
+    const TriangleMesh mesh = extract_surface(shape, 64, {}, &report);
+    BOOST_TEST(report.pieces == piece_count(mesh));
+    BOOST_TEST(report.pieces > 1);
+    BOOST_TEST(report.thin_cells > 0);
+    BOOST_REQUIRE(report.notes.size() == 1u);
+    BOOST_TEST(report.notes[0].find(std::to_string(report.pieces) + " pieces") != std::string::npos);
+    BOOST_TEST(report.notes[0].find(std::to_string(report.holding_resolution)) != std::string::npos);
+    ExtractionReport finer;
+    extract_surface(shape, report.holding_resolution, {}, &finer);
+    BOOST_TEST(finer.pieces == 1);
+    BOOST_TEST(finer.notes.empty());
+  }
+}
+
+BOOST_AUTO_TEST_CASE(refined_thin_parts_hold_together_without_cracks) {
+  const Vec3 ways[] = {Vec3(0.52, 0.31, 0.23), Vec3(0.6, 0.02, 0.01), Vec3(0.4, 0.4, 0.4),
+                       Vec3(-0.1, 0.5, 0.31)};
+  for (const Vec3& way : ways)
+    for (const double radius : {0.03, 0.014, 0.009})
+      for (const int n : {24, 47}) {
+        const auto shape = dumbbell(radius, way);
+        ExtractionReport report;
+        const TriangleMesh mesh = extract_surface(shape, {.resolution = n, .refine_thin = true}, {}, &report);
+        check_closed(mesh);
+        BOOST_TEST(report.pieces == piece_count(mesh));
+        // Twice as thick as the cells of the third factor.
+        if (2.0 * radius > 1.0 / (n - 1)) BOOST_TEST(report.pieces == 1);
+        BOOST_TEST(!report.open);
+        double worst = 0.0;
+        for (Index i = 0; i < mesh.vertices.rows(); ++i)
+          worst = std::max(worst, std::abs(shape(mesh.vertices.row(i).transpose())));
+        BOOST_TEST(worst < 1.5 / (n - 1));  // three quarters of a cell
+      }
+}
+
+BOOST_AUTO_TEST_CASE(what_is_not_thin_stays_as_it_is) {
+  const auto shape = shapes::ball_and_box();
+  ExtractionReport plain, refined;
+  const TriangleMesh a = extract_surface(shape, 64, {}, &plain);
+  const TriangleMesh b = extract_surface(shape, {.resolution = 64, .refine_thin = true}, {}, &refined);
+  BOOST_TEST((a.vertices == b.vertices));
+  BOOST_TEST((a.triangles == b.triangles));
+  BOOST_TEST(plain.evaluations == refined.evaluations);
+  BOOST_TEST(plain.pieces == 1);
+  BOOST_TEST(plain.thin_cells == 0);
+  BOOST_TEST(plain.notes.empty());
+}
+
+BOOST_AUTO_TEST_SUITE_END()
 
 BOOST_AUTO_TEST_SUITE_END()
