@@ -37,7 +37,7 @@ endif
 NATIVE_TESTS := $(BUILD)/tests/native_tests
 export ARAPFIELDS_NATIVE_TESTS := $(NATIVE_TESTS)
 
-.PHONY: help setup build examples demo test test-slow test-rounding test-windows test-arm64 fuzz fuzz-contact bench sanitize format lint wheels workflows extension release blenders gallery docs clean
+.PHONY: help setup build examples demo test test-slow test-rounding test-windows test-arm64 fuzz fuzz-contact bench sanitize format lint wheels extension release blenders gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -174,7 +174,7 @@ sanitize: setup  ## the native tests under the address and undefined-behaviour s
 	ASAN_OPTIONS=detect_leaks=0:detect_odr_violation=0 UBSAN_OPTIONS=print_stacktrace=1 build/sanitize/tests/native_tests --run_test='!@fork'
 	$(SANITIZED) -B build/sanitize-thread -DARAPFIELDS_SANITIZE=thread -DARAPFIELDS_BACKEND=eigen -DARAPFIELDS_PYTHON=OFF
 	$(VENV)/bin/cmake --build build/sanitize-thread --target native_tests
-	build/sanitize-thread/tests/native_tests --run_test=threads,live_threads --run_test='!@fork'
+	build/sanitize-thread/tests/native_tests --run_test=threads --run_test='!@fork'
 
 # The Eigen backend, which the sanitizers see into.
 SCENES := 2000
@@ -183,7 +183,7 @@ fuzz-contact: setup  ## 2,000 random scenes in contact under the address and und
 	$(COMPILER)
 	$(SANITIZED) -B build/sanitize-eigen -DARAPFIELDS_SANITIZE=address,undefined -DARAPFIELDS_BACKEND=eigen -DARAPFIELDS_PYTHON=OFF
 	$(VENV)/bin/cmake --build build/sanitize-eigen --target native_tests
-	UBSAN_OPTIONS=print_stacktrace=1 ARAPFIELDS_CONTACT_SCENES="$(FIRST) $(SCENES)" build/sanitize-eigen/tests/native_tests --run_test=contact_scenes
+	UBSAN_OPTIONS=print_stacktrace=1 ARAPFIELDS_CONTACT_SCENES="$(FIRST) $(SCENES)" build/sanitize-eigen/tests/native_tests --run_test=contact/scenes
 
 # What these words read from git; an unpacked archive has none.
 .PHONY: git-clone
@@ -212,10 +212,6 @@ wheel-tools: $(VENV)/.ready
 
 wheels: wheel-tools  ## for pip, in dist: wheels for Blender's Pythons; PLATFORM=linux-arm64, windows-x64, windows-arm64, macos-arm64, macos-x64 or all
 	$(PY) cmake/wheel/build_wheels.py $(PLATFORM) --output dist
-
-# KEEP="NAME …" hands variables of this shell on to the steps, such as a compiler's cache.
-workflows: git-clone setup  ## the continuous integration's steps for Linux, run here one by one in fresh clones: build/workflows
-	$(PY) tests/packaging/run_workflow.py .github/workflows/*.yml $(if $(KEEP),--keep $(KEEP))
 
 extension: wheels $(BLENDER)  ## for Blender: dist/arapfields-<version>-linux-x64.zip, of these wheels; PLATFORM as above
 	$(PY) blender_scripts/build_extension.py $(PLATFORM) --output dist

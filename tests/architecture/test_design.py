@@ -12,7 +12,6 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 NATIVE = ROOT / "native"
 PACKAGES = [ROOT / "addon", NATIVE / "python" / "arapfields"]
-LISTS = 65  # declarations of several members or functions that native headers have today: only fewer
 
 
 def name(path):
@@ -59,49 +58,3 @@ def test_no_two_headers_define_one_name():
     names = Counter(found for defined in headers.values() for found in defined)
     assert len(names) > 150
     assert not {found for found, times in names.items() if times > 1}
-
-
-SCOPE = re.compile(
-    r"(template\s*<.*>\s*)?(inline\s+)?(namespace|class|struct|union|extern)\b(?!.*[=(])", re.S
-)
-
-
-ACCESS = ("public", "private", "protected")
-
-
-def declarations(text):
-    """What stands before each semicolon of a header, outside of functions and of initialisers."""
-    text = re.sub(r"//[^\n]*|/\*.*?\*/", " ", text, flags=re.S)
-    text = re.sub(r'"(?:[^"\\\n]|\\.)*"', '""', text)
-    text = re.sub(r"^\s*#(?:[^\n]*\\\n)*[^\n]*", " ", text, flags=re.M)
-    statement, scopes = "", []  # of each open brace, whether it holds declarations
-    for place, letter in enumerate(text):
-        if letter == "{":
-            scopes.append(all(scopes) and bool(SCOPE.match(statement.strip())))
-            statement = "" if scopes[-1] else statement
-        elif letter == "}":
-            ends = scopes.pop() or (all(scopes) and text[place + 1 :].lstrip()[:1] not in tuple(";,{"))
-            statement = "" if ends else statement
-        elif not all(scopes):
-            continue
-        elif letter == ";":
-            yield " ".join(statement.split())
-            statement = ""
-        else:
-            statement = "" if statement.strip() in ACCESS and letter == ":" else statement + letter
-
-
-def lists_several(declaration):
-    """Whether a declaration has a comma that stands in no brackets."""
-    before = ""
-    while before != declaration:
-        before, declaration = declaration, re.sub(r"\([^()]*\)|\[[^][]*\]|(?<=\w)<[^<>]*>", "", declaration)
-    return "," in declaration and not re.match(r"(using|friend|static_assert|enum)\b", declaration)
-
-
-def test_a_declaration_in_a_native_header_has_one_name():
-    assert lists_several("int a, b") and lists_several("void f(int), g()")
-    assert not lists_several("std::map<int, int> f(int a, int b = g(1, 2))")
-    headers = sorted(NATIVE.rglob("*.h"))
-    found = [f"{name(p)}: {d}" for p in headers for d in declarations(p.read_text()) if lists_several(d)]
-    assert len(headers) > 100 and len(found) <= LISTS, "\n".join(found)

@@ -30,30 +30,6 @@ def tracked(*suffixes):
     return sources
 
 
-def declared(folder, kind):
-    """Raw values of one kind in the table: as they stand there, before anything is resolved."""
-    for block in options_table.read().values():
-        for place in ("options", "override"):
-            for option in block.get(place, {}).values():
-                if kind in option:
-                    yield option[kind]
-
-
-def test_no_sentence_stands_twice():
-    sentences = [text for text in declared(FOLDER, "sentence") if len(text) > 20]
-    for choices in declared(FOLDER, "choices"):
-        sentences += [text for _, text in choices.values() if len(text) > 20]
-    assert len(sentences) > 60
-    sources = {path: path.read_text() for path in tracked(".py", ".cpp", ".h", ".toml", ".md", ".txt")}
-    copies = [
-        (text, str(path.relative_to(ROOT)))
-        for text in sentences
-        for path, content in sources.items()
-        if content.count(text) > (path == FOLDER / "options.toml")
-    ]
-    assert not copies, copies
-
-
 def cpp_defaults(text):
     """(name, literal) of members and parameters with a default, and of bound arguments."""
     kinds = r"(?:int|bool|float|double|Index|std::u?int\d+_t|std::string)"

@@ -43,7 +43,7 @@ def sources(*suffixes):
 
 
 def name(path):
-    return str(path.relative_to(ROOT))
+    return path.relative_to(ROOT).as_posix()
 
 
 def includes(path):

@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The documentation is true: its code runs, links and pictures exist, the site builds without a warning."""
 
-import json
 import re
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -63,18 +61,6 @@ def test_messages_of_the_troubleshooting_page_are_in_the_code():
     assert not missing
 
 
-def test_the_troubleshooting_page_has_every_message_of_the_extension():
-    sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
-    import messages
-
-    page = (pages.ROOT / "docs" / "troubleshooting.md").read_text()
-    filled, found = messages.filled(page), messages.of_the_extension()
-    explained = sum(messages.stands_in(message, page) for message in found)
-    assert len(found) > 130 and 40 < explained < len(found)
-    assert not [message for message in found if not messages.stands_in(message, filled)]
-    assert filled.count("\n- `") == page.count("\n- `") + len(found) - explained
-
-
 def test_the_tables_of_options_are_filled():
     sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
     import options
@@ -119,32 +105,6 @@ def test_the_diagram_is_that_of_the_code():
     import diagram
 
     assert diagram.PICTURE.read_text() == diagram.svg(), "run python docs/hooks/diagram.py"
-
-
-def test_figures_in_the_pages_are_those_measured():
-    sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
-    import measured
-
-    for page in measured.PAGES:
-        text = page.read_text()
-        assert len(measured.MARKED.findall(text)) >= 1
-        assert text == measured.refreshed(text), "run python docs/hooks/measured.py"
-
-
-def test_the_tables_of_the_peers_are_those_measured():
-    sys.path.insert(0, str(pages.ROOT))
-    from tests.benchmarks import render
-
-    text, kept = render.PEERS.read_text(), json.loads(render.PEERS.with_suffix(".json").read_text())
-    assert text == render.peers_page(text, kept), "run python -m tests.benchmarks.render"
-    assert {"implicit-arap", "gaussStylization"} == {row["code"] for row in kept["rows"] if "code" in row}
-
-
-def test_automatic_is_the_processor_in_the_option_and_on_the_page():
-    options = tomllib.loads((pages.ROOT / "native/options/options.toml").read_text())
-    device = options["machine"]["options"]["device"]
-    assert device["default"] == "auto" and device["choices"]["auto"][1].startswith("The processor")
-    assert "*Automatic* is the processor" in (pages.ROOT / "docs/performance.md").read_text()
 
 
 @pytest.mark.slow

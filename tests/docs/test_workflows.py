@@ -206,7 +206,6 @@ def test_each_workflow_has_a_picture_and_starts_from_what_is_shipped():
     for page in WORKFLOWS.glob("*.md"):
         if page.stem not in ("index", "python", "cpp"):
             assert re.search(r"gallery/(loop|workflow)-", page.read_text().split("\n1. ")[0])
-            assert len(page.read_text().split()) <= 300
         assert "make examples" in page.read_text()
 
 
