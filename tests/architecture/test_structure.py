@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The structure of docs/architecture.md, kept by tests: layering, what may import what."""
+"""The structure of docs/architecture.md: licences, layers, circles, names and formats."""
 
 import ast
 import re
 import subprocess
 import sys
+from collections import Counter
+from graphlib import TopologicalSorter
 from pathlib import Path
+
+import pytest
+
+# The structure of docs/architecture.md, kept by tests: layering, what may import what.
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = [
@@ -198,3 +204,78 @@ def test_test_files_import_helpers_alone():
         local = [ast.unparse(node) for node in imported if id(node) in inner]
         words = ("import bpy", "support") if path.parent.name == "blender" else ("support",)
         assert not [line for line in local if any(word in line for word in words)], (name(path), local)
+
+
+# Rules that single files do not show: circles, names defined twice, declarations of several names.
+
+NATIVE = ROOT / "native"
+PACKAGES = [ROOT / "addon", NATIVE / "python" / "arapfields"]
+
+
+def included_files(path):
+    """The files of ours that a C++ file includes."""
+    for text in re.findall(r'^\s*#include\s+[<"]([^">]+)[">]', path.read_text(), flags=re.M):
+        found = (root / text for root in (path.parent, NATIVE, NATIVE / "include"))
+        yield from (file for file in found if file.is_file())
+
+
+def imports(path, package):
+    """The files of a Python package that one of its files imports, within functions too."""
+    inside = path.relative_to(package).parent.parts
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            folders = (*inside[: len(inside) - node.level + 1], *filter(None, (node.module or "").split(".")))
+            base = package.joinpath(*folders)
+            for alias in node.names:
+                within = (base / f"{alias.name}.py", base / alias.name / "__init__.py")
+                around = (base.with_suffix(".py"), base / "__init__.py")
+                yield next(file for file in (*within, *around, path) if file.is_file())
+
+
+@pytest.mark.parametrize("language", ["C++", "Python"])
+def test_no_file_needs_itself_by_way_of_others(language):
+    if language == "C++":
+        files = [path for path in NATIVE.rglob("*") if path.suffix in (".h", ".cpp", ".cu")]
+        graph = {path: set(included_files(path)) for path in files}
+    else:
+        graph = {p: {*imports(p, root)} - {p} for root in PACKAGES for p in root.rglob("*.py")}
+    assert sum(map(len, graph.values())) > 300
+    TopologicalSorter({name(path): {*map(name, needed)} for path, needed in graph.items()}).prepare()
+
+
+def test_no_two_headers_define_one_name():
+    """The library is one namespace: two classes of one name would share their functions when linked."""
+    definition = (
+        r"^(?:class|struct|enum class)\s+(?:ARAPFIELDS_\w+\s+)?(\w+)(?=\s*(?:final)?\s*(?:: [^;()]*)?\{)"
+    )
+    headers = {path: re.findall(definition, path.read_text(), flags=re.M) for path in NATIVE.rglob("*.h")}
+    names = Counter(found for defined in headers.values() for found in defined)
+    assert len(names) > 150
+    assert not {found for found, times in names.items() if times > 1}
+
+
+# Sources stand as clang-format and ruff leave them (`make format` does it).
+
+TOOLS = Path(sys.executable).parent
+
+
+def run(tool, *arguments):
+    if not (TOOLS / tool).exists():
+        pytest.skip(f"{tool} is not installed beside Python")
+    done = subprocess.run([TOOLS / tool, *arguments], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_native_sources_are_formatted():
+    sources = [str(path) for folder in ("native", "tests") for path in (ROOT / folder).rglob("*.[ch]*")]
+    sources = sorted(path for path in sources if path.endswith((".h", ".cpp")))
+    assert len(sources) > 100
+    run("clang-format", "--dry-run", "--Werror", *sources)
+
+
+def test_python_sources_are_formatted():
+    run("ruff", "format", "--check", "-q", ".")
+
+
+def test_python_sources_pass_the_linter():
+    run("ruff", "check", "-q", ".")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What make extension and make wheels refuse: parts that lack, wheels that were changed, foreign needs."""
+"""The zips of the extension: their contents, their guide, and an archive of the sources."""
 
+import os
 import re
 import subprocess
 import sys
@@ -8,14 +9,17 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from support.blender.inside import require_bpy
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "blender_scripts"), str(ROOT / "cmake/wheel")]
 
 import build_extension  # noqa: E402
 import python_headers  # noqa: E402
-from extension import archive, check  # noqa: E402
+from extension import archive, check, guide  # noqa: E402
 from platforms import PLATFORMS, PYTHONS, declared  # noqa: E402
+
+# What make extension and make wheels refuse: parts that lack, wheels that were changed, foreign needs.
 
 LINUX, MACS = PLATFORMS["linux-x64"], PLATFORMS["macos-arm64"]
 
@@ -137,3 +141,87 @@ def test_a_library_for_macs_that_was_changed_after_signing_is_refused(tmp_path):
     assert check_wheel.signature_problem(data, image) == ""
     data[100] ^= 1
     assert check_wheel.signature_problem(data, image) == "was changed after it was signed"
+
+
+# Who installs the source code by mistake reads what to install instead.
+
+WITHOUT_LIBRARY = """
+import sys
+
+
+class Nowhere:
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        if name == "arapfields":
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+
+import importlib.util, bpy
+real = importlib.util.find_spec
+importlib.util.find_spec = lambda name, package=None: None if name == "arapfields" else real(name, package)
+sys.meta_path.insert(0, Nowhere)
+print(bpy.ops.extensions.package_install_files(
+    filepath=sys.argv[1], repo="user_default", enable_on_install=True))
+bpy.ops.mesh.primitive_cube_add()
+try:
+    bpy.ops.arapfields.stylize()
+except RuntimeError as error:
+    print("OPERATOR", error)
+from bl_ext.user_default.arapfields.commands.main import run
+print("COMMAND", run(["stylize", "--style", "cube", "-i", "a.ply", "-o", "b.ply"]))
+"""
+
+
+def test_it_is_enabled_and_says_so(tmp_path):
+    require_bpy()
+    path = tmp_path / "arapfields-main.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        for file in (ROOT / "addon").rglob("*"):
+            if file.is_file() and "__pycache__" not in file.parts:
+                archive.write(file, Path("arapfields-main") / file.relative_to(ROOT))
+        archive.write(ROOT / "README.md", "arapfields-main/README.md")
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_LIBRARY, str(path)],
+        env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user"), "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0 and "{'FINISHED'}" in done.stdout, done.stdout + done.stderr
+    advice = (
+        "The native library is not part of this installation. Install arapfields-<version>-<platform>.zip"
+    )
+    assert f"ARAP Fields: {advice}" in done.stderr  # at once
+    assert advice in done.stdout[done.stdout.index("OPERATOR") :]
+    assert "COMMAND 2" in done.stdout and f"arapfields: {advice}" in done.stderr
+
+
+# The guide in the extension's zip: every page and picture that Blender's right click may open.
+
+
+@pytest.fixture(scope="module")
+def files():
+    return guide.guide_files(ROOT / "docs")
+
+
+def test_every_page_is_there_and_links_lead_to_what_ships(files):
+    pages = {name for name in files if name.endswith(".html")}
+    assert pages == {f"guide/{page.stem}.html" for page in (ROOT / "docs/guide").glob("*.md")}
+    for name in pages:
+        html = files[name].decode()
+        assert "<h1" in html and "<!-- settings" not in html
+        anchors = {
+            page: set(re.findall(r'id="([^"]+)"', content.decode()))
+            for page, content in files.items()
+            if page in pages
+        }
+        for target in re.findall(r'(?:href|src)="([^"]+)"', html):
+            path, _, anchor = target.partition("#")
+            there = f"guide/{path}" if path else name
+            assert there in files, (name, target)
+            assert anchor in {"", *anchors.get(there, ())}, (name, target)
+
+
+def test_the_pages_that_tooltips_name_are_there(files):
+    source = (ROOT / "addon/blender/guide.py").read_text()
+    named = set(re.findall(r'"(?:ARAPFIELDS_PG_\w+)": "(\w+)"', source))
+    assert len(named) > 3 and {f"guide/{page}.html" for page in named} <= {*files}
