@@ -46,7 +46,6 @@ def errors(case, rest, moved, held):
 
 def measure(case):
     from support.geometry import contact_cases as family
-    from support.geometry import overlaps
 
     rest, triangles = family.surface(case.shape, str(shapes.data()))
     size = np.ptp(rest, axis=0).max()
@@ -63,7 +62,7 @@ def measure(case):
         row["deep_free"] = 100 * family.deepest(case, free) / size
         row["deep"] = 100 * family.deepest(case, moved) / size
     if case.itself:
-        for name, reader in (("inside", overlaps.overlapping), ("cut", overlaps.crossing)):
+        for name, reader in (("inside", family.overlapping), ("cut", family.crossing)):
             row[name + "_free"] = 100 * reader(rest, free, triangles)
             row[name] = 100 * reader(rest, moved, triangles)
     return {k: round(v, 4) if isinstance(v, float) else v for k, v in row.items()}, moved

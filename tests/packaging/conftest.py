@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.programs.environments import fresh, run
-from support.programs.native_build import BUILD, CMAKE, ROOT
+from support.programs.environments import BUILD, CMAKE, ROOT, fresh, run
 
 
 @pytest.fixture(scope="session")

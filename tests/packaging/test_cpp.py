@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from support.geometry import meshes
 from support.geometry.cases import turn
-from support.programs.environments import run
-from support.programs.native_build import BUILD, CMAKE, NATIVE, PUBLIC, ROOT, cached
+from support.programs.environments import BUILD, CMAKE, NATIVE, PUBLIC, ROOT, cached, run
 
 import arapfields as af
 

@@ -7,7 +7,7 @@ import trimesh
 from support.geometry import contact_cases
 from support.geometry.bar import LEFT, RIGHT, bar_samples, box, turned
 from support.geometry.characters import FOOT, HIP, LEG, THICKNESS, trousers
-from support.geometry.contact_bar import (
+from support.geometry.contact_cases import (
     ALIKE,
     BALL,
     BLOCK,

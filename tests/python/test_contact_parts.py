@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 import trimesh
-from support.geometry import contact_cases, overlaps
+from support.geometry import contact_cases
 from support.geometry.bar import box, turned
 from support.geometry.cases import turn
 from support.geometry.characters import FOOT, HIP, LEG, trousers
@@ -77,7 +77,7 @@ def test_feet_that_jump_past_each_other_do_not_end_in_each_other(aside):
     field = af.deform(samples, handles, af.DeformOptions(centers=600), contact=af.Contact(itself=True))
     for _ in range(2):  # so that no vertex stands for more than that of the area
         vertices, triangles = trimesh.remesh.subdivide(vertices, triangles)
-    assert overlaps.overlapping(vertices, field(vertices), triangles) < INSIDE
+    assert contact_cases.overlapping(vertices, field(vertices), triangles) < INSIDE
     assert field.report.flipped_share == 0
 
 

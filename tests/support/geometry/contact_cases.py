@@ -1,19 +1,57 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random poses that press shapes onto obstacles or themselves."""
+"""Scenes in contact: a bar pressed onto solids, figures and hands, and how deep parts overlap."""
 
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 import arapfields as af
 
+from .bar import LEFT, RIGHT, turned
 from .cases import box, moved, shift, turn
 from .characters import Capsules
 from .meshes import read
-from .nudge import nudges
+from .nudge import nudged, nudges
+
+# A bar pressed onto solids.
+
+# Contact goes without locality, and so do the solves that it is compared with.
+QUICK = af.LiveOptions(samples=800, coarse_centers=30, fine_centers=150, locality=0)
+DEEPEST = 0.004  # 0.1 % of the bar's length
+ALIKE = 0.04  # 1 % of it: difference of solves that end a little earlier
+DOWN = turned(0, shift=(0, 0, -0.9))
+DEEP = [LEFT, DOWN @ RIGHT]
+
+
+def solid(mesh, center):
+    return af.MeshSdf(nudged(mesh.vertices + np.array(center)), mesh.faces)
+
+
+BALL = solid(trimesh.creation.icosphere(3, 0.5), [1.2, 0, -1.2])
+BLOCK = solid(trimesh.creation.box((0.6, 3, 0.6)), [1.0, 0, -1.1])
+PLATE = solid(trimesh.creation.box((3, 3, 0.03)), [1.5, 0, -0.8])
+SHEET = af.MeshSdf(
+    np.array([[0, -2, -0.8], [4, -2, -0.8], [4, 2, -0.8], [0, 2, -0.8]]), np.array([[0, 1, 2], [0, 2, 3]])
+)
+
+
+class Plane(af.ImplicitFunction):
+    gradient_bound = 1.0
+
+    def __call__(self, points):
+        return points[:, 2] + 0.8
+
+
+def live(samples, contact=None):
+    return af.LiveDeformer(samples, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], QUICK, contact=contact)
+
+
+# Random poses that press shapes onto obstacles or themselves.
 
 VERTICES = 50_000
 
@@ -231,3 +269,50 @@ def family(data, seeds=(0, 1)):
 def deepest(case, points):
     """Largest depth of a point in an obstacle, as a share of the largest extent at rest."""
     return max((0.0, *(float(-s.distance(points).min()) for s in case.solids)))
+
+
+# Two measures of self-intersection that is not present at rest.
+
+
+def areas(vertices, triangles):
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def overlapping(rest, vertices, triangles):
+    """Share of the area that lies inside another part, by winding numbers."""
+    import trimesh
+
+    def inside(points):
+        normals = trimesh.Trimesh(points, triangles, process=False).vertex_normals
+        size = np.ptp(rest, axis=0).max()
+        return np.asarray(af.winding_number(points, triangles, points - 5e-4 * size * normals)) > 1.5
+
+    twice = inside(vertices) & ~inside(rest)
+    weights = areas(rest, triangles)
+    return float(weights @ twice[triangles].mean(1) / weights.sum())
+
+
+def crossing(rest, vertices, triangles):
+    """Share of the area of triangles cut by edges of others that are not their neighbors at rest."""
+    corners, before = vertices[triangles], rest[triangles].mean(1)
+    middles = corners.mean(1)
+    radius = np.linalg.norm(corners - middles[:, None], axis=2).max()
+    tree = cKDTree(middles)
+    pairs = tree.query_pairs(2 * radius, output_type="ndarray")
+    far = np.linalg.norm(before[pairs[:, 0]] - before[pairs[:, 1]], axis=1) > 4 * radius
+    pairs = pairs[far]
+    cut = np.zeros(len(triangles), bool)
+    for i, j in ((0, 1), (1, 0)):
+        a, b, c = (corners[pairs[:, i], k] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        for k in range(3):
+            p, q = corners[pairs[:, j], k], corners[pairs[:, j], (k + 1) % 3]
+            s, t = ((p - a) * normal).sum(1), ((q - a) * normal).sum(1)
+            through = s * t < 0
+            x = p + (s / np.where(through, s - t, 1))[:, None] * (q - p)
+            for u, v in ((a, b), (b, c), (c, a)):
+                through &= (np.cross(v - u, x - u) * normal).sum(1) > 0
+            cut[pairs[through].ravel()] = True
+    weights = areas(rest, triangles)
+    return float(weights[cut].sum() / weights.sum())

@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands and Python environments isolated from this environment."""
+"""Commands and Python environments isolated from this one, the tested build, and its files."""
 
 import os
+import re
+import shutil
 import subprocess
 import sys
+from pathlib import Path
+
+# Commands and Python environments isolated from this environment.
 
 LEFT_OUT = ("CMAKE_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "PYTHONPYCACHEPREFIX", "VIRTUAL_ENV")
 
@@ -24,3 +29,17 @@ def fresh(folder, *wanted):
     python = folder / "venv" / "bin" / "python"
     run(python, "-m", "pip", "install", "-q", "--disable-pip-version-check", *wanted)
     return python
+
+
+# The tested build, and its files installed by CMake.
+
+ROOT = Path(__file__).resolve().parents[3]
+NATIVE = ROOT / "native"
+BUILD = ROOT / "build" / "wheel"
+CMAKE = shutil.which("cmake", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+PUBLIC = sorted((NATIVE / "include" / "arapfields").glob("*.h"))
+
+
+def cached(name):
+    """An entry of the build's CMake cache."""
+    return re.search(rf"^{name}:\w+=(.*)$", (BUILD / "CMakeCache.txt").read_text(), re.M)[1]
