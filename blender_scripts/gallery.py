@@ -54,7 +54,7 @@ ONE_AT_A_TIME = threading.Lock()
 
 
 def with_imports(name, found=()):
-    """A figure's module, and the modules that it imports."""
+    """A module of figures, and the modules of figures that it imports."""
     path = HERE / "figures" / f"{name}.py"
     if path in found:
         return list(found)
@@ -68,7 +68,7 @@ def content_hash(figure):
     """Hash of the library's sources, stage and shapes, and the figure's modules."""
     digest = hashlib.sha256(b"draft" if "STAGE_DRAFT" in os.environ else b"")
     further = [*(HERE / name for name in OF_PAGES), *(ROOT / "docs" / page for page in figure.pages)]
-    for path in [*LIBRARY, *(HERE / name for name in SHARED), *with_imports(figure.name)]:
+    for path in [*LIBRARY, *(HERE / name for name in SHARED), *with_imports(figure.module)]:
         digest.update(path.read_bytes())
     further += [HERE / "windowed.py", *windowed.SCRIPTS] if figure.window else []
     for path in further if figure.pages else ():
@@ -83,7 +83,8 @@ def pictures(folder):
 
 def draw(name, folder):
     """In the figure's process: renders into an empty folder, and writes the measurements there."""
-    measured = importlib.import_module(f"figures.{name}").render(folder)
+    figure = next(figure for figure in FIGURES if figure.name == name)
+    measured = getattr(importlib.import_module(f"figures.{figure.module}"), f"draw_{name}")(folder)
     for path in folder.glob("*.png"):
         store(path)
     files = sorted(path.name for path in pictures(folder))

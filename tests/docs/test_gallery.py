@@ -23,9 +23,15 @@ def names(paths):
     return {path.stem for path in paths}
 
 
-def test_a_picture_depends_on_the_figures_that_its_module_takes_from():
-    assert {"hero", "common", "deformations", "styles"} == names(gallery.with_imports("hero"))
-    assert {"exact", "common"} == names(gallery.with_imports("exact"))
+def test_a_picture_depends_on_the_modules_that_its_own_takes_from():
+    assert {"deforming", "styling", "common"} == names(gallery.with_imports("deforming"))
+    assert {"styling", "common"} == names(gallery.with_imports("styling"))
+
+
+def test_every_figure_has_a_function_that_draws_it():
+    for figure in FIGURES:
+        source = (pages.ROOT / "blender_scripts/figures" / f"{figure.module}.py").read_text()
+        assert f"\ndef draw_{figure.name}(output):" in source, figure.name
 
 
 def test_every_committed_figure_has_its_pictures_and_figures():
