@@ -20,9 +20,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "blender_scripts")]
 
 import bpy  # noqa: E402
-import child  # noqa: E402
-import menagerie  # noqa: E402
-import scanned  # noqa: E402
+import creatures  # noqa: E402
+import people  # noqa: E402
 import stage  # noqa: E402
 from mathutils import Matrix, Vector  # noqa: E402
 
@@ -106,7 +105,7 @@ def alone():
 
 def stand(name, shape, column):
     """The shape as an object in its column, on the floor."""
-    item = child.coloured(name, shape)
+    item = people.coloured(name, shape)
     item.location = ((column - 2) * SPACING, 0, -float(shape.vertices[:, 2].min()))
     item.rotation_euler.z = math.radians(TURN)
     bpy.context.view_layer.update()
@@ -185,8 +184,8 @@ def main():
     begin = time.perf_counter()
     addon.register()
     stage.clear()
-    dogs = {name: stand(name, menagerie.load("dog"), column) for column, name in COLUMNS.items()}
-    scan = stand("Scan", scanned.hound(), 3)
+    dogs = {name: stand(name, creatures.load("dog"), column) for column, name in COLUMNS.items()}
+    scan = stand("Scan", creatures.hound(), 3)
     hats = [hat(dogs["Mesh"]), hat(dogs["Posed"])]
     with alone():
         add_pins(dogs["Mesh"])

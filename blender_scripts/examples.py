@@ -14,11 +14,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "blender_scripts")]
 
 import bpy  # noqa: E402
-import child  # noqa: E402
-import dressing  # noqa: E402
-import grown  # noqa: E402
-import menagerie  # noqa: E402
-import scanned  # noqa: E402
+import creatures  # noqa: E402
+import people  # noqa: E402
 import stage  # noqa: E402
 import walking  # noqa: E402
 from mathutils import Vector  # noqa: E402
@@ -36,7 +33,7 @@ LAST = 48  # last frame of the motion, which is a loop
 
 def figure(name, shape, turn):
     """An object of the shape on the floor, rotated about z by `turn` degrees."""
-    item = child.coloured(name, menagerie.load(shape))
+    item = people.coloured(name, creatures.load(shape))
     item.rotation_euler.z = turn
     item.location.z = -min(vertex.co.z for vertex in item.data.vertices)
     return item
@@ -71,19 +68,19 @@ def pins():
 
 def character():
     """A rigged child with eyes, a shirt and hair as separate objects."""
-    made = child.build_scene()
+    made = people.build_scene()
     in_studio([made.body], azimuth=18, elevation=6, around=[(-0.95, 0, 1.9), (0.95, 0, 1.9)])
     chosen(made.body)
 
 
 def skin():
     """A body of separate triangles, eyes, a shirt, and an armature without bindings."""
-    body = child.coloured("Body", child.body(cells=72))
-    child.shirt(body)
-    child.split(body)
-    for place, side in zip(child.EYES, "RL", strict=True):
-        child.eye(place, side)
-    dressing.rig(child.JOINTS)
+    body = people.coloured("Body", people.body(cells=72))
+    people.shirt(body)
+    people.split(body)
+    for place, side in zip(people.EYES, "RL", strict=True):
+        people.eye(place, side)
+    people.rig(people.JOINTS)
     in_studio([body], azimuth=18, elevation=6, around=[(-0.95, 0, 1.9), (0.95, 0, 1.9)])
     chosen(body)
 
@@ -144,7 +141,7 @@ def walk():
 def wrap():
     """A dog, and as its target the scan of another one, rough and with holes."""
     dog = figure("Dog", "dog", 0)
-    scan = child.coloured("Scan", scanned.hound(), roughness=0.8)
+    scan = people.coloured("Scan", creatures.hound(), roughness=0.8)
     scan.location.x = APART
     in_studio([dog, scan], azimuth=28, elevation=11, around=[(0, -1.4, 1.3), (0, -0.7, 1.8)])
     chosen(dog)
@@ -152,7 +149,7 @@ def wrap():
 
 def transfer():
     """A child with a rig, shape keys, eyes and a shirt, an adult's mesh, and landmarks on both."""
-    body, other = grown.beside_child(APART)
+    body, other = people.beside_child(APART)
     in_studio([body, other], azimuth=24, elevation=6, around=[(-0.9, 0, 1.9), (APART + 1.05, 0, 2.3)])
     stage.brighten(0.75)
     chosen(body)
@@ -212,8 +209,8 @@ def write(folder):
         )
     (folder / "meshes").mkdir(exist_ok=True)
     for name in MESHES:
-        export(menagerie.load(name), folder / "meshes" / f"{name}.ply")
-    export(menagerie.load("dinosaur"), folder / "dinosaur.obj")
+        export(creatures.load(name), folder / "meshes" / f"{name}.ply")
+    export(creatures.load("dinosaur"), folder / "dinosaur.obj")
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 

@@ -6,7 +6,7 @@
 A picture is up to date if a hash of its modules, the common modules and the library's sources is unchanged.
 manifest.json in the output folder contains the hashes and measured figures. Figures of published shapes need
 ../shared/data (or ARAPFIELDS_DATA) and are written to out/gallery, outside the repository; those of a window
-need a Blender with a window (windowed.py). Figures with missing requirements are reported and left out.
+need a Blender with a window (at_hand.py). Figures with missing requirements are reported and left out.
 """
 
 import argparse
@@ -29,19 +29,11 @@ ROOT = HERE.parent
 sys.path[:0] = [str(HERE)]
 
 import at_hand  # noqa: E402
-import windowed  # noqa: E402
 from figures import FIGURES  # noqa: E402
 from pictures import SUFFIX, store  # noqa: E402
 
-SHARED = ["stage.py", "shapes.py", "creatures.py", "menagerie.py", "figures/common.py"]
-OF_PAGES = [
-    "examples.py",
-    "child.py",
-    "dressing.py",
-    "grown.py",
-    "scanned.py",
-    "walking.py",
-]  # modules of figures that run a page's script
+SHARED = ["stage.py", "shapes.py", "creatures.py", "figures/common.py"]
+OF_PAGES = ["examples.py", "people.py", "walking.py"]  # modules of figures that run a page's script
 LIBRARY = [
     path
     for path in sorted((ROOT / "native").rglob("*"))
@@ -70,7 +62,7 @@ def content_hash(figure):
     further = [*(HERE / name for name in OF_PAGES), *(ROOT / "docs" / page for page in figure.pages)]
     for path in [*LIBRARY, *(HERE / name for name in SHARED), *with_imports(figure.module)]:
         digest.update(path.read_bytes())
-    further += [HERE / "windowed.py", *windowed.SCRIPTS] if figure.window else []
+    further += [HERE / "at_hand.py", *at_hand.SCRIPTS] if figure.window else []
     for path in further if figure.pages else ():
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

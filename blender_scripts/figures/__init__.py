@@ -11,7 +11,7 @@ class Figure(NamedTuple):
     published: bool = False  # needs the published networks or meshes; written outside the repository
     peers: bool = False  # shows results of others' code
     pages: tuple = ()  # of docs, whose scripts it runs
-    window: bool = False  # needs a Blender with a window: see windowed.py
+    window: bool = False  # needs a Blender with a window: see at_hand.py
     timed: bool = False  # tells how long something took: nothing else is rendered meanwhile
 
 

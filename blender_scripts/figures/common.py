@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import bpy
-import menagerie
+import creatures
 import numpy as np
 import stage
 from mathutils import Matrix, Vector
@@ -135,7 +135,7 @@ def stack(paths, target, gap=6, horizontal=False):
 
 
 def shape(name):
-    return menagerie.load(name)
+    return creatures.load(name)
 
 
 def suzanne(levels=2):

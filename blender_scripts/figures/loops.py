@@ -7,14 +7,14 @@ import tempfile
 import time
 from pathlib import Path
 
+import at_hand
 import bpy
 import numpy as np
 import stage
 import walking
-import windowed
-from dressing import seen_mesh
 from mathutils import Matrix
 from mathutils.bvhtree import BVHTree
+from people import seen_mesh
 
 import arapfields as af
 
@@ -86,7 +86,7 @@ def window_loop(output):
 
     with tempfile.TemporaryDirectory() as folder:
         film = Path(folder) / "film"
-        windowed.record("out/examples/pins.blend", film)
+        at_hand.record("out/examples/pins.blend", film)
         found = json.loads((film / "checks.json").read_text())
         if "error" in found:
             raise RuntimeError(found["error"])

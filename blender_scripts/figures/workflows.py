@@ -9,10 +9,8 @@ import tempfile
 from pathlib import Path
 
 import bpy
-import child
-import dressing
-import grown
 import numpy as np
+import people
 import stage
 from mathutils import Matrix, Vector
 
@@ -121,13 +119,13 @@ BONE = (0.02, 0.12, 0.55)
 
 def scan():
     """Its triangles, loose, noisy, with holes."""
-    shape, rng = grown.body(), np.random.default_rng(0)
+    shape, rng = people.adult_body(), np.random.default_rng(0)
     kept = shape.triangles[rng.random(len(shape.triangles)) > 0.04]
     corners = (shape.vertices[kept] + rng.normal(0, 0.002, (len(kept), 1, 3))).reshape(-1, 3)
     mesh = bpy.data.meshes.new("Scan")
     mesh.from_pydata(corners.tolist(), [], np.arange(len(corners)).reshape(-1, 3).tolist())
     mesh.materials.append(stage.material("Scan", stage.CLAY))
-    return dressing.link("Scan", mesh)
+    return people.link("Scan", mesh)
 
 
 def bones_of(rig):
@@ -143,7 +141,7 @@ def as_seen(name, item, rig, column):
     paint.node_tree.nodes["Principled BSDF"].inputs["Alpha"].default_value = 0.6
     mesh.materials.clear()
     mesh.materials.append(paint)
-    shown = [dressing.link(name, mesh)]
+    shown = [people.link(name, mesh)]
     for head, tail in bones_of(rig):
         way = tail - head
         bpy.ops.mesh.primitive_cone_add(vertices=4, radius1=0.1 * way.length, radius2=0, depth=way.length)
@@ -175,15 +173,15 @@ def pose(rig):
 def draw_wrapping(output):
     extension()
     stage.clear()
-    body, rig = child.coloured("Body", child.body()), dressing.rig(child.BONES)
-    dressing.weigh(body, child.BONES)
+    body, rig = people.coloured("Body", people.body()), people.rig(people.BONES)
+    people.weigh(body, people.BONES)
     body.modifiers.new("Armature", "ARMATURE").object = rig
     target = scan()
     body.arapfields.wrap.onto = target
     bpy.context.view_layer.objects.active = body
     body.select_set(True)
     bpy.context.view_layer.update()
-    for rest, there in grown.PAIRS:
+    for rest, there in people.PAIRS:
         bpy.ops.arapfields.add_landmark(rest=rest, on_target=there)
     shown = as_seen("Template", body, rig, 0)
     bpy.context.view_layer.objects.active = body

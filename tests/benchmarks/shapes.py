@@ -44,9 +44,9 @@ def label(name):
 @functools.cache
 def own_mesh(name):
     """Vertices and triangles of a creature or a stand-in, centered, with largest half extent HALF_EXTENT."""
-    import menagerie
+    import creatures
 
-    shape = menagerie.load(OURS.get(name, name))
+    shape = creatures.load(OURS.get(name, name))
     vertices = shape.vertices.astype(float)
     low, high = vertices.min(0), vertices.max(0)
     return HALF_EXTENT * (vertices - (low + high) / 2) / ((high - low).max() / 2), shape.triangles

@@ -47,11 +47,11 @@ print(json.dumps({
 
 def run():
     """A row per number of bones, each measured in a separate process."""
-    import child
+    import people
 
-    body, rows = child.body(cells=CELLS), []
+    body, rows = people.body(cells=CELLS), []
     for count in COUNTS:
-        bones = rig(child.JOINTS, count)
+        bones = rig(people.JOINTS, count)
         ends = [(bone.head, bone.tail) for bone in bones]
         parents = [-1 if bone.parent is None else bone.parent for bone in bones]
         with tempfile.NamedTemporaryFile(suffix=".npz") as file:

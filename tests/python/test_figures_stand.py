@@ -10,7 +10,7 @@ import pytest
 import arapfields as af
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender_scripts"))
-import menagerie
+import creatures
 import standing
 
 MOST_TILT = 5.0  # degrees
@@ -25,7 +25,7 @@ QUICK = ["cube", "octahedron", "icosahedron", "square pyramid", "plane pair"]
 
 
 def styled(name, style, count=20000, **options):
-    shape = menagerie.load(name)
+    shape = creatures.load(name)
     samples = af.sample_mesh(shape.vertices, shape.triangles, count=count, seed=0)
     field = af.stylize(samples, style, af.StylizeOptions(field="radial", **options))
     return shape.vertices, field(shape.vertices), shape.triangles, field.report
@@ -44,7 +44,7 @@ def looks_right(rest, moved, triangles, report, style):
 
 
 def test_the_measures_measure():
-    shape = menagerie.load("dog")
+    shape = creatures.load("dog")
     rest, triangles = shape.vertices, shape.triangles
     parts = standing.feet(rest, triangles)
     assert len(parts) == 4 and standing.unevenness(rest, parts, np.ptp(rest[:, 2])) < 0.01
@@ -54,7 +54,7 @@ def test_the_measures_measure():
     assert standing.tilt(rest, rest * [1.2, 0.9, 1.1] + 3, triangles) < 2
     assert standing.unevenness(rest @ turn.T, parts, np.ptp(rest[:, 2])) > MOST_UNEVEN
     cube = af.preferred_normals("cube")
-    box = menagerie.load("bar")
+    box = creatures.load("bar")
     assert standing.share_along(box.vertices, box.triangles, cube) > 0.7
     assert standing.enclosed(2 * rest, triangles) == pytest.approx(8 * standing.enclosed(rest, triangles))
 
@@ -80,7 +80,7 @@ def test_every_style_of_every_figure_stands(name, style):
 @pytest.mark.parametrize("style", ["icosahedron", "triangular pyramid"])
 def test_thin_limbs_do_not_fold_between_the_samples_solved_at(style):
     """Of 20,000 samples the energy sees 8,000; the lizard's toes folded between those, to det J = -1.1."""
-    shape = menagerie.load("lizard")
+    shape = creatures.load("lizard")
     samples = af.sample_mesh(shape.vertices, shape.triangles, count=20000, seed=0)
     field = af.stylize(samples, style)
     assert np.linalg.det(field.jacobian(samples.points)).min() > 0

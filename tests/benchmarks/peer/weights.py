@@ -50,7 +50,7 @@ def by_nearest_bone(vertices, triangles, bones):
 
 def by_bone_heat(vertices, triangles, bones):
     """Blender's *With Automatic Weights*."""
-    import dressing
+    import people
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     mesh = bpy.data.meshes.new("body")
@@ -59,7 +59,7 @@ def by_bone_heat(vertices, triangles, bones):
     bpy.context.collection.objects.link(item)
     parents = [None if bone.parent is None else bones[bone.parent].name for bone in bones]
     ends = [(tuple(bone.head), tuple(bone.tail)) for bone in bones]
-    rig = dressing.rig({b.name: (p, *pair) for b, p, pair in zip(bones, parents, ends, strict=True)})
+    rig = people.rig({b.name: (p, *pair) for b, p, pair in zip(bones, parents, ends, strict=True)})
     for each in (item, rig):
         each.select_set(True)
     bpy.context.view_layer.objects.active = rig
@@ -150,14 +150,14 @@ def unwelded(vertices, triangles):
 
 
 def rows():
-    import child
+    import people
 
-    body = child.body(cells=CELLS)
+    body = people.body(cells=CELLS)
     vertices, triangles = body.vertices.astype(float), body.triangles
-    names = list(child.JOINTS)
+    names = list(people.JOINTS)
     bones = [
         af.Bone(head, tail, None if parent is None else names.index(parent), name=name)
-        for name, (parent, head, tail) in child.JOINTS.items()
+        for name, (parent, head, tail) in people.JOINTS.items()
     ]
     motions = poses(bones)
     some = np.sort(np.random.default_rng(1).permutation(triangles.size)[:SAMPLES])  # corners of triangles

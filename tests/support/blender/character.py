@@ -15,7 +15,7 @@ from support.geometry.characters import Capsules
 import arapfields as af
 
 sys.path.append(str(Path(__file__).resolve().parents[3] / "blender_scripts"))
-from dressing import link, rig, seen_mesh, strands, weigh
+from people import link, rig, seen_mesh, strands, weigh
 
 HEIGHT = 1.8
 EYE, EYES = 0.032, [(side * 0.055, -0.118, 1.68) for side in (-1, 1)]
