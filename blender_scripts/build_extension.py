@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "blender_scripts"), str(ROOT / "cmake/wheel")]
 
-from extension import archive, check, guide  # noqa: E402
+from extension import archive, guide  # noqa: E402
 from extension.blender import extension_tool  # noqa: E402
 from platforms import PLATFORMS  # noqa: E402
 
@@ -52,7 +52,7 @@ def build(platform, folder):
     path = folder / f"arapfields-{version}-{platform.name}.zip"
     licence, pages = (ROOT / "LICENSE").read_text(), guide.guide_files(ROOT / "docs")
     archive.write_extension(addon, wheels, licence, pages, path, platform.name)
-    check.check_zip(path, wheels)
+    archive.check_zip(path, wheels)
     extension_tool("validate", path)
     print(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")
 

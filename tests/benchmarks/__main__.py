@@ -24,7 +24,7 @@ from . import shapes
 
 FOLDER = Path(__file__).parent
 TARGET = shapes.ROOT / "build" / "bench.json"
-HELPERS = {"__main__", "timing", "render", "live_cases", "live_picture", "shapes", "peer"}
+HELPERS = {"__main__", "timing", "render", "shapes", "peer"}
 
 
 def machine():

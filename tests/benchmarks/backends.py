@@ -11,7 +11,7 @@ import numpy as np
 import arapfields as af
 
 from . import shapes
-from .live_cases import Clock, deformer, targets
+from .shapes import Clock, deformer, targets
 
 SITE = shapes.ROOT / "build/eigen/site"
 ROUNDS = 3

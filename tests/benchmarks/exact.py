@@ -16,8 +16,7 @@ import arapfields as af
 from arapfields._native import testing
 
 from . import shapes
-from .live_cases import inside
-from .shapes import cases
+from .shapes import cases, inside
 
 CENTERS = 1200  # centers of the oracle's fine scale
 SAMPLES_A_CENTER = 8

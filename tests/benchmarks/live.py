@@ -5,7 +5,7 @@ import numpy as np
 
 import arapfields as af
 
-from .live_cases import FULL, Clock, deformer, handles, label, samples, targets
+from .shapes import FULL, Clock, deformer, handles, label, samples, targets
 
 NEURAL_ITERATIONS = 500
 

@@ -13,7 +13,7 @@ import numpy as np
 import arapfields as af
 
 from . import shapes
-from .peer import elastic_brush, gauss_build, registration, theirs, weights, yardstick
+from .peer import registration, theirs, weights, yardstick
 from .peer.problems import awkward, of_figures
 from .peer.theirs import Refused
 
@@ -26,6 +26,8 @@ LAMBDAS = (1.0, 4.0, 16.0)  # of gaussStylization; its own example has 4
 CUBE = np.vstack([np.eye(3), -np.eye(3)])
 METHODS = {"Laplacian Deform": "laplacian", "Lattice": "lattice", "Surface Deform": "surface"}  # Blender's
 CAGE = 24  # cells a side of Surface Deform's cage
+POISSON = 0.4  # of the material; .5 keeps the volume
+BRUSH_RADIUS = 0.1  # of the brush, over the size: a finger's length
 
 
 def clocked(call):
@@ -38,6 +40,25 @@ def ours(problem, **options):
     """A default deform, from the mesh on."""
     samples = af.sample_mesh(problem.vertices, problem.triangles)
     return af.deform(samples, problem.handles, af.DeformOptions(**options))(problem.vertices)
+
+
+def grabbed(points, centre, pull, radius):
+    """The points moved by a grab of this radius that takes the centre along by `pull`."""
+    away = points - centre
+    far = np.sqrt((away**2).sum(1, keepdims=True) + radius**2)
+    b = 1 / (4 * (1 - POISSON))
+    along = (away @ pull)[:, None] * away
+    moved = ((1 - b) / far + radius**2 / (2 * far**3)) * pull + b / far**3 * along
+    at_centre = (1 - b) / radius + 1 / (2 * radius)
+    return points + moved / at_centre
+
+
+def elastic_stroke(problem):
+    """A stroke of Blender's Elastic Deform brush (de Goes and James 2017): the pulled vertex meets its goal."""
+    (row,), (goal,) = problem.moved, problem.goals
+    centre = problem.vertices[row]
+    radius = BRUSH_RADIUS * np.ptp(problem.vertices, axis=0).max()
+    return grabbed(problem.vertices, centre, goal - centre, radius)
 
 
 def by_libigl(problem, most=1000, tolerance=1e-4):
@@ -99,7 +120,7 @@ def methods(problem, checkout):
     if len(problem.moved) == 1:
         yield (
             "Blender, Elastic Deform's formula",
-            lambda: (*clocked(lambda: elastic_brush.stroke(problem)), ""),
+            lambda: (*clocked(lambda: elastic_stroke(problem)), ""),
         )
     yield "implicit-arap", implicit
 
@@ -134,7 +155,7 @@ def constraint_rows(problem, checkout):
 
 def style_rows(checkout):
     """The published cow, or our dog, towards a cube."""
-    module = gauss_build.built(checkout)
+    module = theirs.built_gauss(checkout)
     vertices, triangles = shapes.mesh("spot")
     what = f"{shapes.label('spot')} to a cube"
     for strength in LAMBDAS:
@@ -208,7 +229,7 @@ def style_verdict(module, problem):
 
 
 def awkward_rows(checkout):
-    module = gauss_build.built(checkout)
+    module = theirs.built_gauss(checkout)
     for name, problem in awkward().items():
         row = {"mesh": name, "ARAP Fields": verdict(problem, ours), "libigl": verdict(problem, by_libigl)}
         row["gaussStylization"] = style_verdict(module, problem)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shapes of the benchmarks: published networks in ARAPFIELDS_DATA, else stand-ins.
+"""The shapes of the benchmarks, and their drags: published networks in ARAPFIELDS_DATA, else stand-ins.
 
 Their figures are not comparable, so rows of stand-ins have their names.
 """
@@ -7,6 +7,7 @@ Their figures are not comparable, so rows of stand-ins have their names.
 import functools
 import os
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -159,3 +160,38 @@ def targets(name, degrees):
 def handles(name, degrees=0.0):
     pairs = zip(placements(name), targets(name, degrees), strict=True)
     return [af.Cuboid(rest, target) for rest, target in pairs]
+
+
+def surface(name, resolution):
+    """Vertices and triangles of the shape."""
+    return af.extract_surface(sdf(name), resolution)
+
+
+def deformer(name, **options):
+    return af.LiveDeformer(samples(name), handles(name), af.LiveOptions(**options))
+
+
+class Clock:
+    """Context manager: wall and processor seconds of a block; the latter do not depend on other load."""
+
+    def __enter__(self):
+        self.begin = time.perf_counter(), time.process_time()
+        return self
+
+    def __exit__(self, *_):
+        self.wall = time.perf_counter() - self.begin[0]
+        self.cpu = time.process_time() - self.begin[1]
+
+
+def inside(placement, points):
+    local = (points - placement[:3, 3]) @ np.linalg.inv(placement[:3, :3]).T
+    return np.abs(local).max(1) <= 1
+
+
+def volume(vertices, triangles):
+    return (
+        np.einsum(
+            "ij,ij->", vertices[triangles[:, 0]], np.cross(*(vertices[triangles[:, k]] for k in (1, 2)))
+        )
+        / 6
+    )

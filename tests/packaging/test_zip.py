@@ -16,7 +16,7 @@ sys.path[:0] = [str(ROOT / "blender_scripts"), str(ROOT / "cmake/wheel")]
 
 import build_extension  # noqa: E402
 import python_headers  # noqa: E402
-from extension import archive, check, guide  # noqa: E402
+from extension import archive, guide  # noqa: E402
 from platforms import PLATFORMS, PYTHONS, declared  # noqa: E402
 
 # What make extension and make wheels refuse: parts that lack, wheels that were changed, foreign needs.
@@ -44,7 +44,7 @@ def written(folder, wheels, guide=("guide/index.html",)):
 
 def test_a_whole_zip_passes_and_says_whom_it_is_for(wheels, tmp_path):
     path = written(tmp_path, wheels)
-    check.check_zip(path, wheels)
+    archive.check_zip(path, wheels)
     with zipfile.ZipFile(path) as content:
         manifest = content.read("blender_manifest.toml").decode()
     assert 'platforms = ["linux-arm64"]' in manifest and "(not yet run)" in manifest
@@ -52,18 +52,18 @@ def test_a_whole_zip_passes_and_says_whom_it_is_for(wheels, tmp_path):
 
 def test_what_is_refused(wheels, tmp_path, monkeypatch):
     with pytest.raises(RuntimeError, match="lacks guide/index"):
-        check.check_zip(written(tmp_path, wheels, ()), wheels)
+        archive.check_zip(written(tmp_path, wheels, ()), wheels)
     with pytest.raises(RuntimeError, match=r"lacks wheels/arapfields.*cp314"):
-        check.check_zip(written(tmp_path, wheels[:2]), wheels)
+        archive.check_zip(written(tmp_path, wheels[:2]), wheels)
     with pytest.raises(RuntimeError, match="other wheels"):
-        check.check_zip(written(tmp_path, wheels), wheels[:2])
+        archive.check_zip(written(tmp_path, wheels), wheels[:2])
     path = written(tmp_path, wheels)
-    monkeypatch.setattr(check, "LIMIT", 100)
+    monkeypatch.setattr(archive, "LIMIT", 100)
     with pytest.raises(RuntimeError, match="the limit is"):
-        check.check_zip(path, wheels)
+        archive.check_zip(path, wheels)
     wheels[1].write_bytes(b"another")
     with pytest.raises(RuntimeError, match=r"another arapfields.*cp313"):
-        check.check_zip(path, wheels)
+        archive.check_zip(path, wheels)
     wheels[2].unlink()
     with pytest.raises(RuntimeError, match=r"lacks arapfields-0.1.0-cp314-cp314-mac.*PLATFORM=macos-arm64"):
         build_extension.own_wheels(MACS, tmp_path, "0.1.0")

@@ -9,8 +9,7 @@ import numpy as np
 import arapfields as af
 
 from .. import shapes
-from ..live_cases import inside
-from ..shapes import meshes
+from ..shapes import inside, meshes
 
 RESOLUTION = 96
 POINT = {  # of the hand whose index finger is pulled by one point: palm's box, point, goal

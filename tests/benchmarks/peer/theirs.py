@@ -5,6 +5,7 @@ import hashlib
 import os
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 import numpy as np
@@ -123,3 +124,35 @@ def gauss(module, vertices, triangles, normals, strength, name):
     called("gauss_stylization.py", module, given, result)
     found = np.load(result)
     return found["moved"], float(found["seconds"][1]), int(found["iterations"])
+
+
+def built_gauss(checkout):
+    """The folder of gauss_stylization.so, compiled if it is not there for this commit."""
+    import pybind11
+
+    folder = KEPT / f"gauss-{commit(checkout).replace(' ', '-')}"
+    module = folder / "gauss_stylization.so"
+    if module.exists():
+        return folder
+    folder.mkdir(parents=True, exist_ok=True)
+    headers = [checkout / name for name in ("libigl/include", "utils_gauss", "utils_cubic")]
+    headers += [Path(sys.prefix) / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}"]
+    headers[-1] /= "site-packages/cmeel.prefix/include/eigen3"
+    headers += [pybind11.get_include(), sysconfig.get_paths()["include"]]
+    flags = ["-std=c++17", "-O3", "-DNDEBUG", "-w", "-fPIC", *(f"-I{path}" for path in headers)]
+    sources = [checkout / "gaussStylization_python" / "main.cpp"]
+    sources += [
+        path for name in ("utils_gauss", "utils_cubic") for path in sorted((checkout / name).glob("*.cpp"))
+    ]
+    objects = []
+    for source in sources:
+        objects.append(folder / f"{source.stem}.o")
+        compiled(["c++", *flags, "-c", source, "-o", objects[-1]])
+    compiled(["c++", "-shared", *objects, "-o", module])
+    return folder
+
+
+def compiled(command):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    if done.returncode:
+        raise Refused(f"does not compile: {done.stderr.strip().splitlines()[-1][:200]}")

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..live_cases import volume
+from ..shapes import volume
 
 
 def normals(vertices, triangles):
