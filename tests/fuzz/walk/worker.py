@@ -50,9 +50,8 @@ def main():
     output = Output()
     import addon
     from tests.blender.walk import world
-    from tests.fuzz.walk.all_rule import All
     from tests.fuzz.walk.plan import Walk
-    from tests.fuzz.walk.rule import Shapes
+    from tests.fuzz.walk.rules import All, Shapes
 
     addon.register()
     world.few_centers()
