@@ -37,7 +37,7 @@ endif
 NATIVE_TESTS := $(BUILD)/tests/native_tests
 export ARAPFIELDS_NATIVE_TESTS := $(NATIVE_TESTS)
 
-.PHONY: help setup build examples demo test test-slow test-rounding test-windows test-arm64 fuzz fuzz-contact bench sanitize format lint wheels extension release blenders gallery docs clean
+.PHONY: help setup build examples demo test test-slow test-rounding test-window test-windows test-arm64 fuzz fuzz-contact bench sanitize format lint wheels extension release blenders gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -151,6 +151,12 @@ test-arm64: setup  ## the wheels' library for 64-bit ARM, and its native tests u
 	$(VENV)/bin/cmake -S . -B $(ARM64) -DARAPFIELDS_NATIVE_TESTS=ON -DCMAKE_EXE_LINKER_FLAGS=-Wl,--allow-shlib-undefined
 	$(VENV)/bin/cmake --build $(ARM64) --target native_tests
 	qemu-aarch64-static -L /usr/aarch64-linux-gnu $(ARM64)/tests/native_tests --color_output=no --report_level=short
+
+# ARAPFIELDS_WINDOW names a Blender with a window that imports arapfields [blender]; WINDOW_PARTS="panel use …" some checks.
+test-window: build  ## the extension in a real window, by mouse and keys; needs a display, xdotool and ImageMagick
+	@test -n "$$DISPLAY" || $(call lacks,A display is needed (Debian: xvfb; xvfb-run make test-window))
+	@command -v xdotool > /dev/null && command -v import > /dev/null || $(call lacks,The mouse and pictures need xdotool and import (Debian: xdotool imagemagick))
+	$(PY) -m tests.gui $(WINDOW_PARTS)
 
 fuzz: build $(VENV)/.tools  ## the nets, long: 20,000 odd calls and 20,000 damaged files of every kind, 10,000 steps of a walk through Blender
 	$(PY) -m tests.fuzz

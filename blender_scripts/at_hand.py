@@ -14,8 +14,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 CHROOT = Path(os.environ.get("ARAPFIELDS_BLENDER52", "/opt/blender52"))
-PROJECT = ("addon", "native/options", "tests/gui", "tests/support")  # copied into it
-SCRIPTS = [ROOT / "tests/gui" / name for name in ("film.py", "mouse.py", "stage.py", "window.py")]
+PROJECT = ("addon", "blender_scripts", "native/options", "tests/gui", "tests/support")  # copied into it
+SCRIPTS = [ROOT / "blender_scripts/film.py"]
+SCRIPTS += [ROOT / "tests/gui" / name for name in ("mouse.py", "stage.py", "window.py")]
 SIZE = (880, 620)  # pixels of the window
 PATIENCE = 900  # seconds; long enough for a busy machine
 SESSION = """
@@ -53,7 +54,7 @@ def unpack(target):
 
 
 def record(scene, folder):
-    """Runs the film of tests/gui on a .blend; pictures and film.json are written to a new folder."""
+    """Runs film.py in a window on a .blend; pictures and film.json are written to a new folder."""
     there = CHROOT / "tmp" / f"arapfields-film-{os.getpid()}"
     shutil.rmtree(there, ignore_errors=True)
     there.mkdir(parents=True)

@@ -61,7 +61,7 @@ def encode(order, waits, path, poster):
     return path.stat().st_size
 
 
-# The pin page's steps done by mouse in Blender's window, as tests/gui/film.py records them. The pictures of
+# The pin page's steps done by mouse in Blender's window, as film.py records them. The pictures of
 # the screen lack the cursor: an arrow is drawn where it was.
 
 VIEW = (0, 27, 722, 555)  # of the window: the viewport with its toolbar

@@ -54,7 +54,7 @@ def grabbed(points, centre, pull, radius):
 
 
 def elastic_stroke(problem):
-    """A stroke of Blender's brush Elastic Deform (de Goes and James 2017): the pulled vertex meets its goal."""
+    """A stroke of Blender's Elastic Deform brush (de Goes, James 2017): the pulled vertex meets its goal."""
     (row,), (goal,) = problem.moved, problem.goals
     centre = problem.vertices[row]
     radius = BRUSH_RADIUS * np.ptp(problem.vertices, axis=0).max()

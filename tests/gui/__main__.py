@@ -2,8 +2,8 @@
 """Checks in Blender's window: `python -m tests.gui [--output FOLDER] [NAME …]`; exit code 1 where one fails.
 
 ARAPFIELDS_WINDOW   command of a Blender with a window (default `blender`), which can import arapfields
-Names are the parts of tests/gui/verdicts.py; film and pose take a file, as film=PINS.blend. By default all
-parts without a file run.
+Names are the parts of tests/gui/verdicts.py; film takes a file, as film=PINS.blend. By default all parts
+without a file run.
 """
 
 import argparse
@@ -18,13 +18,13 @@ from .verdicts import EXPECTED, JUDGED
 
 WINDOW = shlex.split(os.environ.get("ARAPFIELDS_WINDOW", "blender"))
 SIZES = {"film": ("880", "620")}
-ALONE = ("film", "pose", "walk", "tutorial")
+ALONE = ("film", "tutorial")
 SCRIPT = Path(__file__).with_name("window.py")
 
 
 def groups(names):
     """The parts by Blender process: each of ALONE separately, the others together."""
-    names = names or [name for name in EXPECTED if "-" not in name and name not in ("film", "pose")]
+    names = names or [name for name in EXPECTED if name != "film"]
     unknown = [name for name in names if part_of(name) not in EXPECTED]
     if unknown:
         raise SystemExit(f"no check is named {', '.join(unknown)}; there are {', '.join(EXPECTED)}")

@@ -1,39 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pin tool by mouse and keys: first pin, drags, Esc, anchors, deleting, rotation of the view."""
+"""The pin tool by mouse and keys: first pin, drags, Esc, anchors, deleting, rotation of the view.
 
-import subprocess
-import time
+Rounds of undo and redo: after drags, right after and during them, and after Esc. States are compared bit by
+bit: names of all data-blocks, positions, transforms, the handles and the shape.
+"""
 
 import bpy
-import live
 import numpy as np
 import stage
-from mouse import drag, hover, is_followed, pixel, release, until
+from mouse import drag, hover, is_dragging, is_followed, pixel, release, until
 from support.blender import scenes
 
-from addon.field_modifier import motion
 from addon.live import sessions
-from addon.live.prefetch import prefetch
-from addon.pin_tool import drag as dragging
-from addon.pin_tool import hover as hovering
 
-SECONDS = 5.0
 END = (0.9, -0.25, 0.0)  # on the bar's front
+ROUNDS, STRIDE = 100, 5  # of undo and redo; states between prints
+KINDS = ("objects", "meshes", "node_groups", "scenes", "collections")
 
 
-def checks(figures, folder, rate_alone=False):
-    if not rate_alone:
-        yield from by_hand(figures, folder)
-    yield from first_and_rate(figures, folder)
-
-
-def set_stage(dense=False):
+def set_stage():
     """Shows only the bar, from the front, and activates the tool."""
     stage.empty_file()
     with stage.override():
         bar = scenes.bar()
-        if dense:
-            stage.dense_bar()
         bpy.context.space_data.show_region_ui = False
         bpy.ops.view3d.view_all()
         bpy.ops.view3d.view_axis(type="FRONT")
@@ -50,7 +39,7 @@ def state():
     return stage.everything(), handles, scenes.world_points(bar).tobytes()
 
 
-def by_hand(figures, folder):
+def checks(figures, folder):
     bar = set_stage()
     yield 0.5
     yield from beside(figures, bar)
@@ -170,59 +159,85 @@ def navigation(figures, folder, bar):
     yield 0.6
 
 
-def first_and_rate(figures, folder):
-    """For 50,000 vertices: time from the press to the first shape, and shapes per second in a drag.
+def undo_checks(figures, folder):
+    bpy.context.preferences.system.viewport_aa = "OFF"  # not needed for undo steps
+    bar = set_stage()
+    yield 0.5
+    before, spot = state(), pixel(END)
+    yield from drag(spot, (spot[0], spot[1] - 100))
+    after = state()
+    known = {name: set(getattr(bpy.data, name).keys()) for name in KINDS}
+    yield from rested(figures, before, after)
+    yield from within(figures, after)
+    yield from escaped(figures, after)
+    for name, names in known.items():
+        figures[f"undo_stray_{name}"] = sorted(set(getattr(bpy.data, name).keys()) - names)
+    stage.picture(folder, "undo")
+    stage.tool("key", "ctrl+z")
+    yield from until(lambda: state() == before, 5.0)
+    figures["undo_to_the_start"] = state() == before
+    bar = bpy.data.objects["Bar"]
+    figures["undo_leaves"] = [item.name for item in bpy.data.objects], [m.name for m in bar.modifiers]
 
-    The solver is set up while the cursor is over the mesh.
-    """
-    bar = set_stage(dense=True)
-    _, area, _ = stage.view()
-    area.spaces.active.overlay.show_overlays = False
-    bpy.context.preferences.system.viewport_aa = "OFF"
-    yield 2.0
-    figures["pins_vertices"] = len(bar.data.vertices)
-    spot = pixel((0.6, -0.25, -0.1))
-    looks, begins = stage.Meter().watch(hovering, "surface"), stage.Meter().watch(dragging, "of_new_pin")
-    yield from hover(spot)
-    yield from until(lambda: prefetch.is_ready())
-    shown, given = [], ["sleep", 0.02, "mousemove", spot[0], spot[1] - 6]
-    original, motion.write = (
-        motion.write,
-        lambda *given: (shown.append(time.perf_counter()), original(*given)),
-    )
-    begin = time.perf_counter()
-    subprocess.Popen(["xdotool", "mousedown", "1", *map(str, given)])
-    while not shown and time.perf_counter() - begin < 10:
-        yield 0.005
-    stage.picture(folder, "pins-first")
-    figures["pins_first_shape_s"] = round(shown[0] - begin, 3)
-    yield 1.0
-    times, stop = stage.draws()
-    del shown[:]
-    heights = [spot[1] - 6 - abs(50 - step % 100) for step in range(2000)]
-    moves = " ".join(f"mousemove {spot[0]} {height} sleep 0.008" for height in heights)
-    moving = subprocess.Popen(["xdotool", *moves.split()])
-    begin, own = time.perf_counter(), time.process_time()
-    yield SECONDS
-    took, own = time.perf_counter() - begin, time.process_time() - own
-    moving.kill()
-    stop()
-    motion.write = original
-    figures["pins_drag"] = {
-        "shapes_per_second": round(len(shown) / took, 1),
-        "draws_per_second": round(len(times) / took, 1),
-        "shapes_per_processor_second": round(len(shown) / own, 1),
-        "window": [bpy.context.window_manager.windows[0].width, bpy.context.window_manager.windows[0].height],
-        "bare_redraw_s": stage.redraw_seconds(),
-    }
-    figures["pins_main_thread"] = {"hover": looks.end(), "press": begins.end()}
-    stage.tool("mouseup", 1)
-    yield 2.0
-    stage.picture(folder, "pins-dense")
-    area.spaces.active.overlay.show_overlays = True
-    empty = bar.arapfields.handles[0].empty
-    own = time.process_time()
-    figures["pins_without_drawing"] = live.without_drawing(empty)
-    rate = figures["pins_without_drawing"]["updates_per_second"]
-    own = (time.process_time() - own) / (rate * live.SECONDS / 2)
-    figures["pins_without_drawing"]["per_processor_second"] = round(1 / own, 1)
+
+def record(figures, name, exact):
+    figures[f"undo_{name}"] = {"exact": sum(exact), "of": len(exact)}
+    if len(exact) % STRIDE == 0:
+        print(name, figures[f"undo_{name}"], flush=True)
+
+
+def rested(figures, before, after):
+    """Undo and redo of a drag whose shape is at rest."""
+    exact = []
+    for _ in range(ROUNDS):
+        for key, expected in (("ctrl+z", before), ("ctrl+shift+z", after)):
+            stage.tool("key", key)
+            yield from until(lambda expected=expected: state() == expected, 5.0)
+            exact.append(state() == expected)
+            record(figures, "after_drags", exact)
+
+
+def within(figures, after):
+    """Keys have no effect while the button is pressed; undo right after the release reverts the drag, redo
+    restores it, and undo reverts it again."""
+    exact = []
+    for number in range(ROUNDS):
+        spot = pixel(bpy.data.objects["Bar"].arapfields.handles[0].empty.location)
+        end = spot[0] + (-1) ** number * 20, spot[1] + 10 * (-1) ** number
+        yield from drag(spot, end, steps=3, pause=0.03, hold=True)
+        held = is_dragging()
+        stage.tool("key", "ctrl+z")
+        yield 0.05
+        stage.tool("key", "ctrl+shift+z")
+        yield 0.05
+        held = held and is_dragging()
+        stage.tool("mouseup", 1)
+        yield 0.05 * (number % 4)  # also before the shape is at rest
+        stage.tool("key", "ctrl+z")
+        yield from until(lambda: state() == after and not is_dragging(), 5.0)
+        exact.append(held and state() == after)
+        record(figures, "within_drags", exact)
+        stage.tool("key", "ctrl+shift+z")
+        yield from until(lambda: state() != after, 5.0)
+        again = state()
+        stage.tool("key", "ctrl+z")
+        yield from until(lambda: state() == after, 5.0)
+        exact.append(again != after and len(bpy.data.objects) == 2 and state() == after)
+        record(figures, "within_drags", exact)
+
+
+def escaped(figures, after):
+    """Esc during a drag."""
+    exact = []
+    for number in range(ROUNDS):
+        spot = pixel(bpy.data.objects["Bar"].arapfields.handles[0].empty.location)
+        end = spot[0] - 30 + number % 7 * 10, spot[1] + 25
+        yield from drag(spot, end, steps=3, pause=0.03, hold=number % 2 == 0)
+        if number % 2 == 0:
+            stage.tool("key", "Escape")
+            yield from release()
+        else:
+            stage.tool("key", "ctrl+z")
+        yield from until(lambda: state() == after, 5.0)
+        exact.append(state() == after)
+        record(figures, "escaped", exact)

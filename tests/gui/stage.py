@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Helpers of the checks in Blender's window: positions, pictures, time measurement."""
+"""Helpers of the checks in Blender's window: positions, pictures, judgements."""
 
 import contextlib
 import json
 import os
 import subprocess
-import time
 import traceback
 
 import bpy
@@ -167,81 +166,3 @@ def everything():
         points[mesh.name] = flat.tobytes()
     where = {o.name: [tuple(row) for row in o.matrix_world] for o in bpy.data.objects}
     return names, points, where
-
-
-def dense_bar(cuts=91):
-    """Subdivides the bar to about 50,000 vertices."""
-    import bmesh
-
-    mesh, cube = bpy.data.objects["Bar"].data, bmesh.new()
-    bmesh.ops.create_cube(cube, size=1.0)
-    bmesh.ops.subdivide_edges(cube, edges=cube.edges, cuts=cuts, use_grid_fill=True)
-    bmesh.ops.scale(cube, vec=(2, 0.5, 0.5), verts=cube.verts)
-    cube.to_mesh(mesh)
-    cube.free()
-    mesh.update()
-
-
-class Meter:
-    """Wall and processor time of the main thread in some functions of the add-on."""
-
-    def __init__(self):
-        self.wall, self.own, self._restore = [], [], []
-
-    def watch(self, owner, name):
-        """Not for methods that Blender calls on registered classes, as draw: it allocates as many arguments
-        as the function declares, here none, and writes the first one anyway, which corrupts memory."""
-        original = getattr(owner, name)
-
-        def timed(*given, **named):
-            wall, own = time.perf_counter(), time.thread_time()
-            try:
-                return original(*given, **named)
-            finally:
-                self.wall.append(time.perf_counter() - wall)
-                self.own.append(time.thread_time() - own)
-
-        setattr(owner, name, timed)
-        self._restore.append((owner, name, original))
-        return self
-
-    def end(self):
-        for owner, name, original in self._restore:
-            setattr(owner, name, original)
-        if not self.wall:
-            return {"calls": 0}
-        return {
-            "calls": len(self.wall),
-            "longest_ms": round(1e3 * max(self.wall), 2),
-            "median_ms": round(1e3 * float(np.median(self.wall)), 2),
-            "median_own_ms": round(1e3 * float(np.median(self.own)), 2),
-            "longest_own_ms": round(1e3 * max(self.own), 2),
-        }
-
-
-def gaps(seconds, figures, name):
-    """The largest delay of a timer of 10 ms while the event loop runs for `seconds`."""
-    late, begin, last = [], time.perf_counter(), time.perf_counter()
-    while time.perf_counter() - begin < seconds:
-        yield 0.01
-        late.append(time.perf_counter() - last - 0.01)
-        last = time.perf_counter()
-    figures[name] = {"longest_s": round(max(late), 4), "median_s": round(float(np.median(late)), 4)}
-
-
-def redraw_seconds(count=5):
-    """Seconds of one redraw of the whole window, without drawing by the add-on."""
-    with override():
-        begin = time.perf_counter()
-        for _ in range(count):
-            bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
-        return round((time.perf_counter() - begin) / count, 4)
-
-
-def draws():
-    """(list that receives the time of each drawing of the viewport, function that ends that)."""
-    times = []
-    handler = bpy.types.SpaceView3D.draw_handler_add(
-        lambda: times.append(time.perf_counter()), (), "WINDOW", "POST_PIXEL"
-    )
-    return times, lambda: bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")

@@ -1,29 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces of boxes, search and the status bar, by mouse."""
+"""Handles by mouse: faces of boxes, a drag in live mode; and the status bar."""
 
 import bpy
 import jobs as window_jobs
+import numpy as np
 import stage
 from mathutils import Vector
-from mouse import pixel, until_idle
+from mouse import pixel, until_idle, until_live_rests
 from support.blender import scenes
 
 from addon.core.runtime import jobs
+from addon.live import sessions
 
 CANCEL = (45, 12)  # pixels from the window's lower right corner to the middle of the status bar's button
 
 
 def checks(figures, folder):
     yield from face(figures, folder)
-    yield from search(figures, folder)
     yield from cancel(figures, folder)
-
-
-def edge_points(empty, count):
-    """Points on edges of the Empty's cube."""
-    ends = [((-1, -1, -1), (1, -1, -1)), ((-1, -1, 1), (1, -1, 1)), ((-1, -1, -1), (-1, -1, 1))]
-    for a, b in ends[:count]:
-        yield empty.matrix_world @ (0.7 * Vector(a) + 0.3 * Vector(b))
 
 
 def face(figures, folder):
@@ -60,22 +54,6 @@ def face(figures, folder):
     figures["face_is_one_undo_step"] = abs(bpy.data.objects["Fixed"].scale.x - before) < 1e-6
 
 
-def search(figures, folder):
-    """Blender's search finds the operators by the add-on's name and by their function."""
-    for words in ("arap", "deform", "stylize"):
-        stage.tool("mousemove", 400, 600)
-        yield 0.5
-        with stage.override():
-            bpy.ops.wm.search_menu("INVOKE_DEFAULT")
-        yield 4.0
-        stage.tool("type", words)
-        yield 3.0
-        stage.picture(folder, f"search-{words}")
-        stage.tool("key", "Escape")
-        yield 0.7
-    figures["searched"] = True
-
-
 def cancel(figures, folder):
     """The status bar's button cancels a job, also without the panel."""
     window, area, _ = stage.view()
@@ -89,3 +67,50 @@ def cancel(figures, folder):
     figures["cancelled_in_the_status_bar"] = running and jobs.running() is None
     area.spaces.active.show_region_ui = True
     yield 1.0
+
+
+def live_checks(figures, folder):
+    """Drags with the mouse: one undo step, which restores the shape."""
+    stage.empty_file()
+    with stage.override():
+        bar, _, moving = scenes.bar_with_handles()
+        bpy.ops.view3d.view_all()
+        scenes.activate(bar)
+    before = stage.everything()
+    with stage.override():
+        bpy.ops.arapfields.live("INVOKE_DEFAULT")
+        scenes.activate(moving)
+        moving["mark"] = 1
+        bpy.ops.ed.undo_push(message="mark")
+    yield from until_live_rests()
+    rest = stage.positions("Bar")
+    stage.tool("mousemove", 600, 500)
+    yield 0.3
+    stage.tool("key", "g")
+    yield 0.3
+    for step in range(1, 9):
+        stage.tool("mousemove", 600 + 8 * step, 500 - 12 * step)
+        yield 0.15
+    stage.tool("click", 1)
+    yield 1.0
+    yield from until_live_rests()
+    moving = bpy.data.objects["Moving"]
+    moved = stage.positions("Bar")
+    stage.picture(folder, "dragged")
+    figures["drag_moved_handle"] = round(float(np.linalg.norm(moving.location - bar.location) - 1), 4)
+    figures["drag_moved_shape"] = round(float(np.abs(moved - rest).max()), 4)
+    with stage.override():
+        bpy.ops.ed.undo()
+    yield 1.0
+    yield from until_live_rests()
+    figures["live_after_undo"] = sessions.is_live(bpy.data.objects["Bar"])
+    moving = bpy.data.objects["Moving"]
+    back = np.allclose(moving.location, (1, 0, 0), atol=1e-6) and moving.get("mark") == 1
+    figures["drag_is_one_undo_step"] = bool(back)
+    figures["shape_returns_with_undo"] = round(float(np.abs(stage.positions("Bar") - rest).max()), 6)
+    bar = bpy.data.objects["Bar"]
+    del moving["mark"]
+    with stage.override():
+        scenes.activate(bar)
+        sessions.end(bpy.context, bar)
+    figures["off_restores"] = stage.everything() == before and not bar.modifiers

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds labels of the panel that Blender would truncate: widths of texts in its font and of the sidebar."""
 
-from pathlib import Path
-
 import blf
 import bpy
 import stage
@@ -28,13 +26,6 @@ def checks(figures, folder):
         yield 0.5
         figures[f"cut_{language}"] = cut()
     interface.language = "en_US"
-    theme = next(Path(one) for one in bpy.utils.preset_paths("interface_theme"))
-    with stage.override():
-        light = str(theme / "Blender_Light.xml")
-        bpy.ops.script.execute_preset(filepath=light, menu_idname="USERPREF_MT_interface_theme_presets")
-    yield 1.0
-    stage.picture(folder, "light")
-    bpy.ops.preferences.reset_default_theme()
     yield from narrower()
     for language in languages:
         interface.language = language

@@ -18,26 +18,21 @@ import bpy
 ROOT = Path(__file__).resolve().parents[2]
 OUTPUT, *GIVEN = sys.argv[sys.argv.index("--") + 1 :]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests/gui")]
+sys.path.append(str(ROOT / "blender_scripts"))  # film.py
 
 import stage  # noqa: E402
 from support.blender import scenes  # noqa: E402
 
 import addon  # noqa: E402
 
-TOGETHER = {name: (name, {}) for name in ("panel", "use", "picks", "jobs", "stalls", "live", "press", "pins")}
-TOGETHER |= {name: (name, {}) for name in ("undo", "render", "table")} | {"wrap": ("wrapping", {})}
-TOGETHER |= {"labels": ("widths", {}), "endings": ("jobs", {"ending": True})}
-SHORTER = {
-    "picks-in-place": ("picks", {"in_place": True}),
-    "pins-rate": ("pins", {"rate_alone": True}),
-    "undo-within": ("undo", {"kinds": ("within",)}),
-    "undo-escaped": ("undo", {"kinds": ("escaped",)}),
-}
-ALONE = ("film", "pose", "walk", "tutorial")  # each in a separate Blender
+TOGETHER = {name: (name, "checks") for name in ("panel", "use", "jobs", "pins")}
+TOGETHER |= {"live": ("use", "live_checks"), "undo": ("pins", "undo_checks"), "wrap": ("wrapping", "checks")}
+TOGETHER |= {"labels": ("widths", "checks"), "endings": ("jobs", "endings")}
+ALONE = ("film", "tutorial")  # each in a separate Blender
 
 
-def checks(module, **given):
-    return functools.partial(importlib.import_module(module).checks, **given)
+def checks(module, name="checks"):
+    return getattr(importlib.import_module(module), name)
 
 
 def together(figures, folder, names):
@@ -46,8 +41,7 @@ def together(figures, folder, names):
     for name in sorted(names, key="endings".__eq__):  # last: the code below continues it
         stage.record(name, stage.BEGUN, folder)
         yield from stage.as_at_first(first)
-        module, given = {**TOGETHER, **SHORTER}[name]
-        yield from checks(module, **given)(figures, folder)
+        yield from checks(*TOGETHER[name])(figures, folder)
         if name != "endings":
             stage.judge(figures, name, folder)
     addon.unregister()

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wrap by mouse: target, landmarks, Wrap, Esc, Factor, undo, reopening of the file, a sequence of scans."""
+"""Wrap by mouse: target, landmarks, Wrap, Esc, undo and redo."""
 
-import shutil
 import time
 import types
 
@@ -19,8 +18,6 @@ from addon.core.runtime import jobs
 SCAN_AT = Vector((2.0, 0, 0))
 # Positions in the sidebar of a window of 1600 × 1000, with only Wrap open.
 EYEDROPPER, BUTTON, WRAP = (1263, 240), (1155, 286), (1155, 517)
-TRANSFER = (1165, 722)
-SEQUENCE = (1155, 825)  # for a wrapped object with fitted bones
 SETTLED = 1.5  # seconds until the sidebar's sections have stopped moving
 
 
@@ -38,29 +35,14 @@ def set_stage():
         body, rig = wraps.rigged_character()
         scan, _ = wraps.scan_of(wraps.grown_parts())
         scan.location = SCAN_AT
-        body.data.materials.append(chequered())
         rig.show_in_front = True
         scenes.activate(body)
         bpy.ops.view3d.view_all()
         bpy.ops.view3d.view_axis(type="FRONT")
-        bpy.context.space_data.shading.color_type = "TEXTURE"
         bpy.ops.ed.undo_push(message="stage")
     yield 2.0
     yield from panel.open_alone({"wrap"})
     yield SETTLED
-
-
-def chequered():
-    picture = bpy.data.images.new("Chequers", 512, 512)
-    picture.generated_type = "COLOR_GRID"
-    material = bpy.data.materials.new("Chequered")
-    material.use_nodes = True
-    node = material.node_tree.nodes.new("ShaderNodeTexImage")
-    node.image = picture
-    shader = material.node_tree.nodes["Principled BSDF"]
-    material.node_tree.links.new(node.outputs[0], shader.inputs[0])
-    material.node_tree.nodes.active = node
-    return material
 
 
 def choose_target(figures, folder):
@@ -110,7 +92,7 @@ def shape():
 
 
 def press(figures, folder):
-    """Presses Esc in the first wrap; a complete one is undone, redone and posed, then loses its target."""
+    """Presses Esc in the first wrap; a complete one is undone, redone and posed."""
     body, rig = bpy.data.objects["Body"], bpy.data.objects["Rig"]
     rest, bones = shape(), wraps.joints(rig, posed=False)
     yield from click(WRAP, pause=1.0)
@@ -146,86 +128,6 @@ def press(figures, folder):
         character.pose(types.SimpleNamespace(rig=rig))
     yield 1.0
     stage.picture(folder, "wrap-posed")
-    yield from hand_on(figures, folder)
-    yield from target_gone(figures, folder)
-
-
-def hand_on(figures, folder):
-    """Transfer to Target with undo and redo: the scan has the body's groups and a separate armature."""
-
-    def given():
-        scan = bpy.data.objects["Scan"]
-        return len(scan.vertex_groups), [m.type for m in scan.modifiers]
-
-    bpy.data.objects["Body"].arapfields.wrap.transfer -= {"KEYS"}  # refused: Mirror changes the vertices
-    before = given()
-    yield from click(TRANSFER, pause=0.5)
-    yield from until_idle(60.0)
-    yield 1.0
-    stage.picture(folder, "wrap-transferred")
-    after = given()
-    figures["wrap_transferred"] = after[0] > 0 and after[1] == ["ARMATURE"] and before == (0, [])
-    yield from keys("ctrl+z", pause=1.5)
-    figures["wrap_transfer_undone"] = given() == before
-    yield from keys("ctrl+shift+z", pause=1.5)
-    figures["wrap_transfer_redone"] = given() == after
-    yield from keys("ctrl+z", pause=1.5)  # the armature poses the scan; landmarks stay
-
-
-def target_gone(figures, folder):
-    """Deletes the target while the object is wrapped onto it again; then reopens the file."""
-    yield from click(WRAP, pause=1.0)
-    was_running = jobs.running() is not None
-    bpy.data.objects.remove(bpy.data.objects["Scan"])
-    yield from until_idle(400.0)
-    yield 1.0
-    stage.picture(folder, "wrap-target-gone")
-    figures["wrap_outlives_its_target"] = was_running and fielded(bpy.data.objects["Body"])
-    before, path = shape(), str(folder / "wrapped.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.open_mainfile(filepath=path)
-    yield 2.0
-    figures["wrap_opened_again"] = np.array_equal(shape(), before)
-    yield from sequence(figures, folder)
-
-
-def sequence(figures, folder):
-    """Wrap Sequence onto a scan that rises from frame 1 to 2: Esc in the first frame, then complete; undo."""
-    body = bpy.data.objects["Body"]
-    shutil.rmtree(folder / "cache", ignore_errors=True)
-    with stage.override():
-        body.arapfields.wrap.frames = home = bpy.data.collections.new("Scans")
-        bpy.context.scene.collection.children.link(home)
-        for number in (1, 2):
-            scan, _ = wraps.scan_of(wraps.grown_parts())
-            scan.name, scan.location = f"scan_{number}", SCAN_AT + Vector((0, 0, 0.1 * number))
-            home.objects.link(scan)
-        for entry in body.arapfields.wrap.landmarks:  # the target's landmarks were deleted with it
-            bpy.data.objects.remove(entry.on_target)
-        scenes.activate(body)
-        bpy.ops.ed.undo_push(message="scans")
-    yield SETTLED
-    before, stack = shape(), [m.type for m in body.modifiers]
-    yield from click(SEQUENCE, pause=1.0)
-    was_running = jobs.running() is not None
-    stage.picture(folder, "wrap-sequence")
-    stage.tool("mousemove", 600, 500)
-    yield from keys("Escape", pause=0.1)
-    yield from until_idle(20.0)
-    figures["sequence_escape"] = was_running and [m.type for m in body.modifiers] == stack
-    yield from click(SEQUENCE, pause=1.0)
-    yield from until_idle(400.0)
-    heights = []
-    for frame in (1, 2):
-        bpy.context.scene.frame_set(frame)
-        heights.append(shape()[:, 2].mean())
-    figures["sequence_rises_by"] = round(float(heights[1] - heights[0]), 3)
-    yield 0.6
-    stage.picture(folder, "wrap-sequence-done")
-    stage.tool("mousemove", 600, 500)
-    yield from keys("ctrl+z", pause=1.5)
-    stack_now = [m.type for m in bpy.data.objects["Body"].modifiers]
-    figures["sequence_undone"] = stack_now == stack and np.array_equal(shape(), before)
 
 
 def fielded(item):

@@ -28,8 +28,6 @@ class Film:
         folder.mkdir(parents=True, exist_ok=True)
 
     def take(self, spot, pressed=False, hold=1):
-        import stage
-
         stage.picture(self.folder, f"{len(self.frames):03}")
         self.frames.append({"cursor": list(spot), "pressed": pressed, "hold": hold})
 
