@@ -112,8 +112,9 @@ TESTS := tests
 test: build $(NATIVE_TESTS)  ## all tests but the slow ones; TESTS="tests/python …" names some
 	$(ALL_TESTS) -m "not slow" $(TESTS)
 
-test-slow: build $(NATIVE_TESTS)  ## every test
-	$(ALL_TESTS) tests
+# Those of tests/packaging compile the library and build packages: they are in no part.
+test-slow: build $(NATIVE_TESTS)  ## every test; PART=N takes a tenth of the slow ones, all in turn as N rises
+	$(ALL_TESTS) $(if $(PART),--slow-part $(PART) $(addprefix tests/,addon_core blender docs python),tests)
 
 # TESTS="tests/python/… …" names some, LEVELS="baseline avx2 …" and NUDGES="0 1 …" conditions; PART=N takes a few
 # minutes' part of all. BACKEND takes one of the two.

@@ -18,6 +18,7 @@ TORCH_ALONE = (
     "tests/packaging/test_libtorch_version.py",
     "tests/python/test_threads.py::test_calls_at_once_have_their_own_numbers_and_torch_keeps_its",
 )
+SLOW_PARTS = 10  # of the slow tests, each some minutes on two processors
 LONG_FIRST = ("docs", "packaging", "native", "blender", "python", "fuzz", "architecture", "addon_core")
 
 
@@ -32,10 +33,24 @@ def deselect_those_of_torch(config, items):
         items[:] = [item for item in items if item not in others]
 
 
+def pytest_addoption(parser):
+    text = f"one of {SLOW_PARTS} parts of the slow tests: all of them in turn as the number rises"
+    parser.addoption("--slow-part", type=int, metavar="NUMBER", help=text)
+
+
+def select_slow_part(config, items, number):
+    slow = [item for item in items if item.get_closest_marker("slow")]
+    chosen = set(slow[number % SLOW_PARTS :: SLOW_PARTS])
+    config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
+    items[:] = [item for item in items if item in chosen]
+
+
 def pytest_collection_modifyitems(config, items):
     """Sorts folders with slow files first, so that parallel processes end at about the same time."""
     items.sort(key=lambda item: LONG_FIRST.index(item.path.relative_to(ROOT / "tests").parts[0]))
     deselect_those_of_torch(config, items)
+    if (number := config.getoption("--slow-part")) is not None:
+        select_slow_part(config, items, number)
 
 
 def pytest_collection_finish():
