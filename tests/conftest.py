@@ -16,7 +16,7 @@ DATA = Path(os.environ.get("ARAPFIELDS_DATA", ROOT.parent / "shared" / "data"))
 # Tests of libtorch, its version and its threads: only for a library built with it.
 TORCH_ALONE = (
     "tests/packaging/test_libtorch_version.py",
-    "tests/python/test_threads.py::test_calls_at_once_have_their_own_numbers_and_torch_keeps_its",
+    "tests/python/test_threads.py::test_concurrent_calls_keep_their_thread_counts",
 )
 SLOW_PARTS = 10  # of the slow tests, each some minutes on two processors
 LONG_FIRST = ("docs", "packaging", "native", "blender", "python", "fuzz", "architecture", "addon_core")

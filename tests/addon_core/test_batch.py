@@ -50,7 +50,7 @@ def test_files_are_found_by_suffix_pattern_and_depth(folders):
         pytest.param("out", ["--pattern", "a**b"], "--pattern", marks=OLDER),
     ],
 )
-def test_what_cannot_be_planned_is_named(folders, output, further, text):
+def test_bad_batch_plans_are_named(folders, output, further, text):
     with pytest.raises(UserError, match=text):
         plan(batch(folders, *further, output=output))
 
@@ -61,7 +61,7 @@ def test_two_sources_of_one_result_are_refused(folders):
         plan(batch(folders, "--format", "stl"))
 
 
-def test_one_failure_or_crash_stops_no_other_and_a_second_run_does_the_rest(folders, capsys):
+def test_failures_stop_no_other_file_and_a_second_run_finishes(folders, capsys):
     for name in ("dies.ply", "fails.ply"):
         (folders / "in" / name).write_text("")
     assert run_batch(batch(folders, "--jobs", "2"), FakeLaunch()) == 1
@@ -83,7 +83,7 @@ def test_one_failure_or_crash_stops_no_other_and_a_second_run_does_the_rest(fold
 
 
 @pytest.mark.parametrize("change", ["option", "source", "result removed", "result older", "again", "none"])
-def test_what_is_done_again(folders, change, capsys):
+def test_changed_inputs_are_done_again(folders, change, capsys):
     run_batch(batch(folders), FakeLaunch())
     source, result, further = folders / "in/a.obj", folders / "out/a.obj", []
     if change == "option":
@@ -307,7 +307,7 @@ def complete(folder):
 
 
 @pytest.mark.parametrize("order", [(1, 2, 3, 4), (3, 1, 4, 2)])
-def test_parts_in_any_order_are_the_whole(order, many, capsys):
+def test_shards_in_any_order_cover_all_inputs(order, many, capsys):
     for number in order:
         assert run_batch(batch(many, "--shard", f"{number}/4", "--jobs", "4"), FakeLaunch()) == 0
         assert f"15 of 15 files to do, the part {number}/4 of 60" in capsys.readouterr().out
@@ -324,7 +324,7 @@ def test_several_writers_divide_the_work(many):
 
 
 @pytest.mark.slow
-def test_kills_in_between_cost_nothing_but_what_was_at_work(many):
+def test_a_killed_batch_repeats_only_unfinished_inputs(many):
     """Killed at random moments, resumed: what was noted is never done again, nothing is left out."""
     choose = random.Random(0)
     for _ in range(4):
@@ -342,7 +342,7 @@ def test_kills_in_between_cost_nothing_but_what_was_at_work(many):
     assert complete(many) and all(after[name] == before[name] for name in noted)
 
 
-def test_what_another_batch_leaves_undone_is_done(many, capsys):
+def test_inputs_abandoned_by_another_batch_are_done(many, capsys):
     """An input that another process has claimed is waited for, and done where that process ended without."""
     for path in sorted((many / "in").iterdir())[2:]:
         path.unlink()
@@ -381,7 +381,7 @@ def test_a_part_may_be_empty(many, capsys):
 
 
 @pytest.mark.parametrize("text", ["0/4", "5/4", "1", "1/0", "-1/4", "a/b", "1/2/3"])
-def test_no_part_of_a_whole(text, many, capsys):
+def test_bad_shards_are_refused(text, many, capsys):
     with pytest.raises(SystemExit):
         batch(many, "--shard", text)
     assert "--shard" in capsys.readouterr().err

@@ -31,7 +31,7 @@ def obj():
 
 
 @pytest.mark.parametrize("name", ["ply", "stl", "obj"])
-def test_no_beginning_of_a_file_is_whole(name, tmp_path):
+def test_truncated_files_are_incomplete(name, tmp_path):
     content, path = {"ply": ply, "stl": stl, "obj": obj}[name](), tmp_path / f"x.{name}"
     path.write_bytes(content)
     assert is_whole(path, [MESH])

@@ -37,7 +37,7 @@ def test_every_change_of_content_changes_the_key(change):
     assert fit_key(v, f, options, version) != fit_key(V, F, OPTIONS, 1)
 
 
-def test_meshes_of_any_unit_are_told_apart():
+def test_meshes_in_any_unit_have_different_keys():
     for scale in (1e-9, 1e9):
         assert fit_key(V * scale, F, OPTIONS, 1) != fit_key(V * scale * 1.01, F, OPTIONS, 1)
         assert fit_key(V * scale, F, OPTIONS, 1) != fit_key(V[::-1] * scale, F, OPTIONS, 1)
@@ -59,7 +59,7 @@ def fit():
 KEY = fit_key(V, F, OPTIONS, 1)
 
 
-def test_what_is_saved_is_found_counted_and_cleared(tmp_path, fit):
+def test_saved_fits_are_found_counted_and_cleared(tmp_path, fit):
     cache = FitCache(tmp_path / "fits")
     assert cache.load(KEY, af.NeuralSdf.load) is None and cache.size() == 0 and cache.clear() == 0
     cache.save(KEY, fit.save)

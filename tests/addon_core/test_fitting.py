@@ -19,7 +19,7 @@ def ball():
     return sphere(1.0, 4)
 
 
-def test_clothes_that_the_wrap_takes_too_near_or_inside_are_at_their_distance(ball):
+def test_clothes_keep_their_distance_after_a_wrap(ball):
     v, f = ball
     body = fitting.Body(af, (v, v, f), (v, f))
     for left in (-0.5, 0.2):
@@ -27,7 +27,7 @@ def test_clothes_that_the_wrap_takes_too_near_or_inside_are_at_their_distance(ba
         assert np.abs(af.MeshSdf(v, f)(shape) / DISTANCE - 1).max() < CLOSE
 
 
-def test_what_is_far_from_the_skin_stays_where_the_wrap_takes_it(ball):
+def test_points_far_from_the_skin_follow_the_wrap(ball):
     """A body that grows to four times its size: a hat that does not need not be pushed away."""
     v, f = ball
     body = fitting.Body(af, (v / 4, v, f), (v, f))

@@ -53,7 +53,7 @@ def run(*works):
     return job
 
 
-def test_what_the_worker_published_is_gone_once_it_has_ended():
+def test_a_finished_job_publishes_nothing():
     """The main thread may still wait to apply it, and looks at what is shown."""
 
     def work(tracker):
@@ -95,7 +95,7 @@ def test_outcomes_are_handed_over_once():
     assert len(job.take_outcomes()) == 1 and job.take_outcomes() == []
 
 
-def test_cancel_reaches_the_running_item_and_those_that_wait():
+def test_cancel_reaches_running_and_waiting_items():
     started = threading.Event()
 
     def first(tracker):
@@ -260,7 +260,7 @@ def test_a_newer_request_ends_the_better_results_of_the_one_before():
     worker.stop()
 
 
-def test_the_error_of_what_failed_first_is_told():
+def test_the_first_error_is_reported():
     def fail(text):
         raise ValueError(text)
 
@@ -324,7 +324,7 @@ def test_even_the_slowest_drawing_goes_on():
     assert throttle.is_due(RedrawThrottle.LONGEST) and not throttle.is_due(RedrawThrottle.LONGEST - 0.1)
 
 
-def test_coroutines_are_run_whole_or_for_a_moment():
+def test_coroutines_run_to_completion_or_for_a_time_slice():
     def coroutine():
         for _ in range(5):
             yield Pause.REDRAW

@@ -35,12 +35,12 @@ def test_wrong_figures_are_no_right_answer(answer):
         self_check.distances(SimpleNamespace(signed_distance=answer))
 
 
-def test_what_should_have_been_refused():
+def test_accepted_bad_input_fails_the_check():
     with pytest.raises(AssertionError, match="not refused"):
         self_check.refusal(SimpleNamespace(signed_distance=lambda *_: None, InvalidInput=ValueError))
 
 
-def test_a_zip_without_a_wheel_for_this_python_says_which_it_has(tmp_path, monkeypatch):
+def test_a_zip_without_a_matching_wheel_lists_its_wheels(tmp_path, monkeypatch):
     """Blender unpacks the wheels for its own Python and system alone."""
     for python in ("cp311", "cp313.cp314"):
         (tmp_path / f"arapfields-0.1.0-{python}-{python}-win_arm64.whl").touch()
@@ -51,7 +51,7 @@ def test_a_zip_without_a_wheel_for_this_python_says_which_it_has(tmp_path, monke
     assert "not part of this installation" in str(native._missing(ModuleNotFoundError(name="arapfields")))
 
 
-def test_a_system_that_the_library_does_not_support_is_named_in_one_line(tmp_path, monkeypatch):
+def test_an_unsupported_system_is_named_in_one_line(tmp_path, monkeypatch):
     """As the loader of a system that is too old, or of another processor, says it."""
     (tmp_path / "arapfields.py").write_text("raise ImportError('GLIBC_2.28 not found')", encoding="utf-8")
     for name in [name for name in sys.modules if name.partition(".")[0] == "arapfields"]:

@@ -125,7 +125,7 @@ def test_a_box_is_the_emptys_cube():
     assert np.allclose(corner, [[0.5, 1.0, 1.5]])
 
 
-def test_a_box_holds_what_is_inside_it():
+def test_a_box_contains_the_points_inside_it():
     rest = np.diag([1.0, 2.0, 3.0, 1.0])
     handle = solve_handle("Empty", "CUBE", rest, np.eye(4), rest, space_of(np.eye(4)))
     points = np.array([[0.9, 1.9, -2.9], [1.1, 0, 0], [0, 2.1, 0], [0, 0, -3.1]])
@@ -176,7 +176,7 @@ TETRAHEDRON = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 
 
 @pytest.mark.parametrize("corners", [TETRAHEDRON, TETRAHEDRON[:2], TETRAHEDRON[:1]])
-def test_every_edge_is_there_once(corners):
+def test_every_edge_occurs_once(corners):
     topology = build_edges(np.array(corners))
     expected = {tuple(sorted((t[k], t[(k + 1) % 3]))) for t in corners for k in range(3)}
     assert len(topology) == len(corners)

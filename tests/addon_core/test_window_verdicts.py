@@ -53,7 +53,7 @@ def test_rules(rule, good, bad, monkeypatch):
     assert failures({"name": good, "error": "Traceback"}, ["part"]) == ["Traceback"]
 
 
-def test_scripts_that_need_a_blender_of_their_own_get_one():
+def test_scripts_with_an_own_blender_are_grouped_apart():
     assert groups(["jobs", "tutorial", "pins", "film=x"]) == [["jobs", "pins"], ["tutorial"], ["film=x"]]
     with pytest.raises(SystemExit, match="no check is named nonsense"):
         groups(["nonsense"])

@@ -103,7 +103,7 @@ def imports(path):
                 yield ".".join([*base, alias.name] if is_module else base)
 
 
-def test_folders_import_towards_the_core_alone():
+def test_folders_import_only_towards_the_core():
     """Operators and panels too; the add-on's own files above all folders use any of them."""
     upward = set()
     for path in modules():
@@ -132,7 +132,7 @@ def test_nothing_but_the_contents_page_needs_operators_or_panels():
     assert not wrong, wrong
 
 
-def test_properties_know_choices_and_tables_alone():
+def test_properties_import_only_choices_and_tables():
     allowed = ("core.settings", "names", "blender.property_definitions", "blender.object_references")
     allowed += ("blender.selection",)
     sources = [path for path in modules() if path.stem == "properties" or path.parent.name == "properties"]

@@ -92,7 +92,7 @@ def test_no_default_stands_twice():
     assert not {str(path.relative_to(ROOT)): found for path, found in wrong.items() if found}
 
 
-def test_ranges_stand_in_the_table_alone():
+def test_ranges_are_declared_only_in_the_table():
     """Neither a check in C++ nor a property in Blender nor a flag gives one of these options a range."""
     checks = re.compile(r'require_(?:range|positive|not_negative)\(\s*"(\w+)"')
     sources = [

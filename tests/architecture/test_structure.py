@@ -192,7 +192,7 @@ def test_an_installed_zip_is_tested_without_the_addons_sources():
         assert not re.search(r"^(from|import) addon\b", path.read_text(), flags=re.M), name(path)
 
 
-def test_test_files_import_helpers_alone():
+def test_test_files_import_only_helpers():
     """What several use lies in tests/support; a test in Blender imports at the top, as other files do."""
     for path in (ROOT / "tests").rglob("test_*.py"):
         tree = ast.parse(path.read_text())

@@ -39,7 +39,7 @@ def test_every_public_name_is_documented():
     assert not undocumented
 
 
-def test_all_lists_what_is_there():
+def test_all_lists_existing_names():
     assert len(set(arapfields.__all__)) == len(arapfields.__all__)
     assert all(hasattr(arapfields, name) for name in arapfields.__all__)
 
@@ -229,7 +229,7 @@ def test_the_stub_says_any_only_where_anything_is_meant():
     assert not [w for w, what in annotations() if what in loose and not w.startswith(pickling)]
 
 
-def test_the_styles_of_the_stub_are_those_that_there_are():
+def test_the_stub_lists_the_library_s_styles():
     alias = re.search(r"^StyleName: typing\.TypeAlias = typing\.Literal\[(.*)\]$", STUB.read_text(), re.M)
     assert re.findall(r"'([^']+)'", alias[1]) == arapfields.style_names()
 

@@ -57,7 +57,7 @@ os.execv(sys.executable, [sys.executable, *sys.argv[2:]])
 """
 
 
-def test_the_array_script_does_a_part_and_begins_again_what_was_killed(place):
+def test_the_array_script_restarts_a_killed_part(place):
     (place / "dies.py").write_text(DIES_ONCE)
     program = (
         f"{sys.executable} {place / 'dies.py'} {place / 'mark'} {ROOT / 'tests/support/programs/batches.py'}"

@@ -23,7 +23,7 @@ def names(paths):
     return {path.stem for path in paths}
 
 
-def test_a_picture_depends_on_the_modules_that_its_own_takes_from():
+def test_a_picture_depends_on_imported_figure_modules():
     assert {"deforming", "styling", "common"} == names(gallery.with_imports("deforming"))
     assert {"styling", "common"} == names(gallery.with_imports("styling"))
 
@@ -56,7 +56,7 @@ def test_pictures_meshes_and_json_stay_small():
     assert len(sizes) > 50 and sum(sizes) < MOST_BYTES
 
 
-def test_what_a_solve_did_not_measure_is_left_out():
+def test_missing_measurements_are_left_out():
     from figures.common import measured
 
     report = {"energy": 0.1234567, "handle_error_mean": 0.0, "preference": None}
@@ -64,7 +64,7 @@ def test_what_a_solve_did_not_measure_is_left_out():
     assert measured(field) == {"energy": 0.12346, "handle_error_mean": 0.0}
 
 
-def test_what_is_not_at_hand_is_named(tmp_path, monkeypatch):
+def test_missing_requirements_are_named(tmp_path, monkeypatch):
     (peers,) = [figure for figure in FIGURES if figure.peers]
     monkeypatch.setattr(at_hand, "PEERS", tmp_path)
     monkeypatch.setenv("ARAPFIELDS_DATA", str(tmp_path / "nowhere"))
@@ -89,7 +89,7 @@ def rendered(monkeypatch):
     return calls
 
 
-def test_what_is_up_to_date_is_skipped(tmp_path, rendered, capsys):
+def test_current_pictures_are_skipped(tmp_path, rendered, capsys):
     figure = COMMITTED[0]
     (tmp_path / "a.png").write_bytes(b"picture")
     entry = {"hash": gallery.content_hash(figure), "files": ["a.png"]}
@@ -101,7 +101,7 @@ def test_what_is_up_to_date_is_skipped(tmp_path, rendered, capsys):
 
 
 @pytest.mark.parametrize("change", ["picture gone", "other sources", "never made"])
-def test_what_is_not_up_to_date_is_rendered(tmp_path, rendered, change):
+def test_outdated_pictures_are_rendered(tmp_path, rendered, change):
     figure = COMMITTED[0]
     if change != "picture gone":
         (tmp_path / "a.png").write_bytes(b"picture")
@@ -114,7 +114,7 @@ def test_what_is_not_up_to_date_is_rendered(tmp_path, rendered, change):
     assert rendered == [figure.name]
 
 
-def test_figures_drawn_at_a_time_keep_their_own_pictures(tmp_path, monkeypatch, capsys):
+def test_figures_drawn_in_parallel_keep_their_pictures(tmp_path, monkeypatch, capsys):
     """Two at a time, one of which fails after it has drawn: it keeps the picture that it had."""
     good, bad = COMMITTED[:2]
     both = threading.Barrier(2, timeout=30)

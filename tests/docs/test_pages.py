@@ -21,7 +21,7 @@ sys.path.insert(0, str(pages.ROOT / "docs" / "hooks"))
 WITH_CODE = [page for page in pages.PAGES if pages.python_blocks(page) and page.parent.name != "workflows"]
 
 
-def test_there_is_code_to_run():
+def test_pages_have_code_to_run():
     assert {"README.md", "scripting.md"} <= {page.name for page in WITH_CODE}
 
 
@@ -147,7 +147,7 @@ PROGRAMS = {"make", "pip", "arapfields", "blender", "python", ".venv/bin/python"
 ALL = [(page, command) for page in pages.PAGES for command in commands(page)]
 
 
-def test_every_block_is_of_a_kind_that_is_tested():
+def test_every_block_has_a_tested_language():
     kinds = {kind for page in pages.PAGES for kind, _ in pages.FENCE.findall(page.read_text())}
     # "py": code with libraries that the tests do not install.
     assert kinds == {"python", "py", "sh", "json", "cpp", "cmake"}
@@ -292,7 +292,7 @@ os._exit(0)
 
 
 @pytest.mark.slow  # a deform, a style and a wrap by their defaults
-def test_the_demo_shows_what_its_captions_say(tmp_path):
+def test_the_demo_matches_its_captions(tmp_path):
     from PIL import Image
 
     command = [sys.executable, str(pages.ROOT / "blender_scripts/demo.py"), "--output", str(tmp_path)]

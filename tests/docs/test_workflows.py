@@ -202,7 +202,7 @@ def test_the_batch_does_the_folder_and_goes_on(place):
     assert len(list((place / "out/cubic").glob("*.ply"))) == 6
 
 
-def test_each_workflow_has_a_picture_and_starts_from_what_is_shipped():
+def test_each_workflow_has_a_picture_and_uses_make_examples():
     for page in WORKFLOWS.glob("*.md"):
         if page.stem not in ("index", "python", "cpp"):
             assert re.search(r"gallery/(loop|workflow)-", page.read_text().split("\n1. ")[0])

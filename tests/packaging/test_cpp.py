@@ -103,7 +103,7 @@ def marked(path):
         yield match["name"], bool(match["tests"])
 
 
-def test_what_is_exported_is_what_headers_mark(prefix):
+def test_exported_symbols_are_those_marked_in_headers(prefix):
     """By class or function: all of them, no other, and what is not for our tests alone is installed."""
     roots = {path: root for root in (NATIVE, BUILD / "generated") for path in root.rglob("*.h")}
     headers = [path for path in roots if "include" not in path.relative_to(roots[path]).parts]
@@ -125,7 +125,7 @@ def test_what_is_exported_is_what_headers_mark(prefix):
     assert not missing, f"marked, but without a symbol: {missing}"
 
 
-def test_the_python_module_exports_its_start_alone():
+def test_the_python_module_exports_only_its_init_function():
     """Of what the standard library has, torch would find ours, where the compiler links it statically."""
     (module,) = LIBRARY.parent.glob("_native*.so")
     found = run("nm", "-D", "--defined-only", module).splitlines()
@@ -226,7 +226,7 @@ def check_example(program, tmp_path, python=sys.executable):
         assert refused.returncode == 2 and word in refused.stderr
 
 
-def test_one_version_of_cmake_is_asked_for():
+def test_all_projects_require_one_cmake_version():
     """By every file that asks for one: ours, the examples', pip's and the page.
 
     The script that installs headers is run by itself, with the policies of CMake 2.4 unless it says so.
@@ -238,7 +238,7 @@ def test_one_version_of_cmake_is_asked_for():
     assert len(asked) == 7 and len(set(asked.values())) == 1, asked
 
 
-def test_the_example_gives_what_python_gives(tmp_path):
+def test_the_cpp_example_agrees_with_python(tmp_path):
     """Against the wheel, whose neighbour has Eigen: no Python need be found, no environment be activated."""
     found = f"-Darapfields_DIR={run(sys.executable, '-m', 'arapfields', '--cmake-dir').strip()}"
     check_example(build_example(tmp_path, found, python=tmp_path / "absent"), tmp_path)

@@ -31,7 +31,7 @@ def beside(folder, built_against):
     return folder
 
 
-def test_the_package_notes_what_it_was_built_against(check):
+def test_the_package_records_its_libtorch_version(check):
     assert (PACKAGE / "libtorch.txt").read_text().strip() == BUILT_AGAINST
     check()
 

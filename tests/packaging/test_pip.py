@@ -54,7 +54,7 @@ def test_the_five_lines_of_the_readme_run_from_the_wheel(environment, tmp_path):
 
 
 @pytest.mark.slow
-def test_metadata_are_those_of_the_project(built):
+def test_wheel_metadata_equal_the_project_s(built):
     with zipfile.ZipFile(built[0]) as archive:
         (name,) = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
         said = Parser().parsestr(archive.read(name).decode())
@@ -75,7 +75,7 @@ def known(*folders):
     return set(done.stdout.splitlines())
 
 
-def test_the_source_distribution_has_what_builds_and_nothing_else(tmp_path):
+def test_the_source_distribution_contains_only_build_files(tmp_path):
     top = {"CHANGELOG.md", "CMakeLists.txt", "LICENSE", "README.md", "pyproject.toml", "PKG-INFO"}
     top |= {"CITATION.cff", "THIRD_PARTY.txt"}
     cmake = {name for name in known("cmake") if not re.search(r"/wheel/|mingw", name)}
@@ -89,7 +89,7 @@ def test_the_source_distribution_builds_by_itself(built, tmp_path):
     run(python, "-c", GIVEN + five_lines() + CHECKED, cwd=tmp_path)
 
 
-def test_warnings_are_errors_for_us_alone():
+def test_warnings_are_errors_only_in_our_builds():
     """Compilers that we have not seen may warn of more."""
     listed = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
     assert re.search(r'option\(ARAPFIELDS_WERROR "[^"]*" OFF\)', listed)

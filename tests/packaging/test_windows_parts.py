@@ -57,7 +57,7 @@ def test_a_run_ends_with_its_process(tmp_path, monkeypatch):
         os.kill(int(done.stdout.split()[0]), signal.SIGKILL)
 
 
-def test_what_does_not_run_under_wine_is_there():
+def test_tests_excluded_under_wine_exist():
     """A test that is renamed would run, and fail, under its new name."""
     for name in NOT_RUN:
         path, _, function = name.partition("::")

@@ -15,7 +15,7 @@ FILES = sorted((ROOT / ".github/workflows").glob("*.yml"))
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
-def test_a_workflow_runs_what_there_is(path):
+def test_workflows_run_existing_commands(path):
     text = path.read_text()
     assert text.startswith("# NOT RUN ON GITHUB YET")
     content = yaml.safe_load(text)

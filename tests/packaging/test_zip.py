@@ -42,7 +42,7 @@ def written(folder, wheels, guide=("guide/index.html",)):
     return path
 
 
-def test_a_whole_zip_passes_and_says_whom_it_is_for(wheels, tmp_path):
+def test_a_complete_zip_passes_and_names_its_platform(wheels, tmp_path):
     path = written(tmp_path, wheels)
     archive.check_zip(path, wheels)
     with zipfile.ZipFile(path) as content:
@@ -50,7 +50,7 @@ def test_a_whole_zip_passes_and_says_whom_it_is_for(wheels, tmp_path):
     assert 'platforms = ["linux-arm64"]' in manifest and "(not yet run)" in manifest
 
 
-def test_what_is_refused(wheels, tmp_path, monkeypatch):
+def test_incomplete_zips_are_refused(wheels, tmp_path, monkeypatch):
     with pytest.raises(RuntimeError, match="lacks guide/index"):
         archive.check_zip(written(tmp_path, wheels, ()), wheels)
     with pytest.raises(RuntimeError, match=r"lacks wheels/arapfields.*cp314"):
@@ -111,7 +111,7 @@ def test_a_wheel_that_asks_for_more_than_the_system_has_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("version", PYTHONS, ids=str)
-def test_pyconfig_answers_what_the_headers_ask(version):
+def test_pyconfig_defines_the_macros_of_the_headers(version):
     """Of the names that this system's own pyconfig.h defines."""
     folder = python_headers.at_hand(version)
     if folder is None:
@@ -203,7 +203,7 @@ def files():
     return guide.guide_files(ROOT / "docs")
 
 
-def test_every_page_is_there_and_links_lead_to_what_ships(files):
+def test_every_guide_page_ships_and_its_links_resolve(files):
     pages = {name for name in files if name.endswith(".html")}
     assert pages == {f"guide/{page.stem}.html" for page in (ROOT / "docs/guide").glob("*.md")}
     for name in pages:
@@ -221,7 +221,7 @@ def test_every_page_is_there_and_links_lead_to_what_ships(files):
             assert anchor in {"", *anchors.get(there, ())}, (name, target)
 
 
-def test_the_pages_that_tooltips_name_are_there(files):
+def test_pages_named_by_tooltips_exist(files):
     source = (ROOT / "addon/blender/guide.py").read_text()
     named = set(re.findall(r'"(?:ARAPFIELDS_PG_\w+)": "(\w+)"', source))
     assert len(named) > 3 and {f"guide/{page}.html" for page in named} <= {*files}

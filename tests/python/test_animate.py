@@ -75,7 +75,7 @@ def said(capsys):
     return text
 
 
-def test_each_frame_is_the_solve_of_its_own_pose(place):
+def test_each_frame_equals_a_solve_of_its_pose(place):
     assert animate(place, "all.pc2", solve=SMALL) == 0
     baked = frames(place / "all.pc2")
     vertices, triangles = read_mesh(place / "bar.ply")
@@ -131,7 +131,7 @@ def test_a_killed_run_goes_on_where_it_was(place):
     assert not list(place.glob(".*"))
 
 
-def test_frames_there_already_are_taken_and_others_are_not(place, capsys):
+def test_matching_frames_on_disk_are_reused(place, capsys):
     def keep(shard):
         arguments = [place / "bar.ply", "--tracks", place / "tracks.json", "-o", place / "x.pc2"]
         assert run("animate", *arguments, *QUICK[:-1], "--shard", shard) == 0
@@ -201,7 +201,7 @@ def test_usd_without_its_package_is_named(place, monkeypatch, capsys):
     assert "pip install 'arapfields[usd]'" in said(capsys)
 
 
-def test_what_was_there_stays_where_the_disk_is_full(place, monkeypatch, capsys):
+def test_a_full_disk_keeps_existing_output(place, monkeypatch, capsys):
     assert animate(place, "x.pc2") == 0
     before = (place / "x.pc2").read_bytes()
     full = shutil.disk_usage(place)._replace(free=1000)
@@ -267,7 +267,7 @@ SOLVE = [
 ]
 
 
-def test_each_frame_is_a_file_whichever_shard_makes_it(tmp_path):
+def test_shards_write_the_same_file_for_each_frame(tmp_path):
     vertices, triangles = sphere(1.0, 2)
     samples = af.sample_mesh(vertices * (2.0, 0.5, 0.5), triangles, 600)
     one = np.ones((len(samples), 1))
@@ -448,7 +448,7 @@ def test_frames_are_numbered_and_boxes_may_be_open(tmp_path):
         (tracks(handle(frames=[RIGHT.tolist(), (2 * RIGHT).tolist()])), "frame 2, handle end: "),
     ],
 )
-def test_what_is_wrong_with_json_is_named(content, text, tmp_path):
+def test_errors_in_json_tracks_are_named(content, text, tmp_path):
     path = tmp_path / "t.json"
     path.write_text(content if isinstance(content, str) else json.dumps(content))
     with pytest.raises(af.InvalidInput, match=text) as error:
@@ -479,7 +479,7 @@ def archive(**changed):
         (archive(frames=np.full((3, 2, 4, 4), np.inf)), "NaN or infinite"),
     ],
 )
-def test_what_is_wrong_with_arrays_is_named(arrays, text, tmp_path):
+def test_errors_in_array_tracks_are_named(arrays, text, tmp_path):
     path = tmp_path / "t.npz"
     np.savez(path, **arrays)
     with pytest.raises(af.InvalidInput, match=text) as error:

@@ -70,7 +70,7 @@ def kinds_of_points():
 
 
 @pytest.mark.parametrize("kind", kinds_of_points())
-def test_the_same_numbers_give_the_same_result_wherever_they_come_from(field, kind):
+def test_equal_arrays_of_any_source_give_equal_results(field, kind):
     given = kinds_of_points()[kind]
     assert np.array_equal(field(given), field(POINTS))
 
@@ -125,7 +125,7 @@ def refusals():
 
 
 @pytest.mark.parametrize("kind", refusals())
-def test_what_is_no_array_of_real_numbers_is_refused_by_name(field, kind):
+def test_arguments_that_are_no_real_arrays_are_named(field, kind):
     given, word = refusals()[kind]
     with pytest.raises(af.InvalidInput, match=rf"^points: .*({word})"):
         field(given)
@@ -146,7 +146,7 @@ class Interrupted:
         raise KeyboardInterrupt
 
 
-def test_ctrl_c_in_a_conversion_stays_what_it_is(field):
+def test_ctrl_c_in_a_conversion_raises_keyboard_interrupt(field):
     with pytest.raises(KeyboardInterrupt):
         field(Interrupted())
 
@@ -379,7 +379,7 @@ refused(lambda: af.arap_energy(bare(af.RadialField), ROWS), "__init__")
 """)
 
 
-def test_none_is_no_object():
+def test_none_is_refused_as_an_object():
     run("""
 refused(lambda: af.sample_surface(None))
 refused(lambda: af.extract_surface(None))

@@ -187,7 +187,7 @@ def test_kinds_of_fields_and_frames_agree(body, striding):
     assert all(np.array_equal(result, expected) for result in results)
 
 
-def test_what_cannot_be_attached_is_refused(body, striding):
+def test_bad_attachments_are_refused(body, striding):
     empty = af.Attachment(body, np.empty((0, 3)))
     assert empty.positions(striding).shape == (0, 3) and len(empty) == 0
     with pytest.raises(af.InvalidInput, match="points"):

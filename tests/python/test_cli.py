@@ -70,7 +70,7 @@ def test_every_option_is_a_flag(capsys):
         assert not missing
 
 
-def test_fit_saves_what_the_library_makes(made, tmp_path):
+def test_fit_saves_the_library_s_result(made, tmp_path):
     report, again = tmp_path / "report.json", tmp_path / AGAIN
     assert run("fit", made / "mesh.obj", "-o", again, "--report", report, "--quiet", *SMALL_FIT) == 0
     points = np.random.default_rng(0).uniform(-1, 1, (50, 3))
@@ -242,7 +242,7 @@ def test_real_meshes(name, data_dir, tmp_path):
     ]  # fmt: skip
 
 
-def test_a_bar_is_drawn_on_a_terminal_alone(made, tmp_path, capsys):
+def test_a_progress_bar_is_drawn_only_on_a_terminal(made, tmp_path, capsys):
     arguments = ["deform", made / "mesh.obj", "-o", tmp_path / "a.obj", *HELD_AND_SHIFTED, *SMALL_SOLVE]
     assert run(*arguments) == 0
     printed = capsys.readouterr()
@@ -431,7 +431,7 @@ def test_interrupt_cancels_and_leaves_nothing(folder):
 
 
 @pytest.mark.parametrize("extra", ["--bogus", "b.ply"])
-def test_what_a_verb_does_not_know_points_to_its_own_help(extra, folder, capsys):
+def test_an_unknown_flag_points_to_the_verb_s_help(extra, folder, capsys):
     line = refusal(capsys, "sample", "a.ply", "--output", "out.ply", extra)
     assert line == f"arapfields sample: unrecognized arguments: {extra} (see arapfields sample --help)\n"
 
@@ -494,7 +494,7 @@ for side in (1, -1):
     TROUSER_BONES.append({"name": f"Leg{side}", "parent": "Spine", **ends})
 
 
-def test_weights_are_those_of_the_library(tmp_path):
+def test_skin_weights_equal_the_library_s(tmp_path):
     mesh, rig, output = (tmp_path / name for name in ("body.ply", "rig.json", "weights.npz"))
     write_mesh(mesh, *af.extract_surface(trousers(), 20)[:2])
     rig.write_text(json.dumps(TROUSER_BONES))
@@ -536,7 +536,7 @@ def told(capsys):
     return json.loads(capsys.readouterr().out)
 
 
-def test_every_verb_and_option_is_there(told):
+def test_every_verb_and_option_is_described(told):
     assert told["program"] == "arapfields" and told["version"] == af.__version__
     assert told["exit_codes"]["2"] == "bad input or usage"
     verbs = {verb["name"]: verb for verb in told["verbs"]}
@@ -597,7 +597,7 @@ MOVES = ("--turn", "--pivot", "--shift", "--scale", "--reach")  # of the last bo
 # Options that go together under a name, in scripts and at the command line.
 
 
-def test_a_preset_sets_what_other_flags_change(tmp_path):
+def test_flags_override_a_preset(tmp_path):
     report = tmp_path / "report.json"
     write_octahedron(tmp_path / "mesh.obj")
     few = [*HELD_AND_SHIFTED, "--preset", "paper", *SMALL_SOLVE, "--quiet", "--report", report]

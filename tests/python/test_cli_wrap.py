@@ -121,7 +121,7 @@ def test_bad_input_is_named_and_nothing_is_written(pair, arguments, said, capsys
     assert not (pair / "out.obj").exists()
 
 
-def test_transfer_gives_the_scan_what_the_template_has(pair):
+def test_transfer_copies_the_template_s_data_to_the_scan(pair):
     v, f = cases.figure(2)
     scan = trimesh.load(pair / "scan.ply", process=False)
     trimesh.Trimesh(cases.moved(v), f, process=False).export(pair / "wrapped.obj")
@@ -237,9 +237,7 @@ def test_a_motion_that_was_stopped_goes_on_as_if_it_had_not_been(
 
 
 @pytest.mark.parametrize(("edited", "redone"), [("scan11", 1), ("scan10", 2), ("scan9", 3)])
-def test_a_changed_frame_is_wrapped_again_with_those_behind_it(
-    tmp_path, wrapped, edited, redone, monkeypatch
-):
+def test_a_changed_frame_and_later_ones_are_wrapped_again(tmp_path, wrapped, edited, redone, monkeypatch):
     (frames, wrap), cache, elsewhere = wrapped, tmp_path / "motion.pc2", tmp_path / "elsewhere.pc2"
     kept = tmp_path / ".motion.pc2.frames"
     count = len(list(kept.iterdir()))
@@ -260,7 +258,7 @@ def test_other_options_wrap_all_frames_anew(tmp_path, wrapped, monkeypatch):
     assert wrap(frames, "-o", cache, "--seed", "3") == 0 and len(anew) == 3
 
 
-def test_what_is_kept_of_a_motion_may_be_damaged(tmp_path, wrapped, monkeypatch):
+def test_a_damaged_cache_of_a_motion_is_replaced(tmp_path, wrapped, monkeypatch):
     (frames, wrap), cache = wrapped, tmp_path / "motion.pc2"
     before = cache.read_bytes()
     for path in (tmp_path / ".motion.pc2.frames").glob("[0-9]*"):

@@ -89,7 +89,7 @@ def test_a_handle_that_is_pulled_into_the_ground_gives_way(samples, kind, itself
     assert held.handle == 1 and held.by == "ground" and held.distance == pytest.approx(0.8, abs=0.05)
 
 
-def test_what_touches_nothing_is_as_without(samples):
+def test_a_shape_that_touches_nothing_is_unchanged(samples):
     """Beside locality, which contact goes without."""
     far = af.Contact([af.Obstacle(BALL)], ground=-5.0, itself=True)
     up = [LEFT, turned(20, shift=(0, 0, 0.3)) @ RIGHT]
@@ -130,7 +130,7 @@ def test_crossed_legs_do_not_pass_each_other():
     assert np.abs(again - vertices).max() < 1e-3 * HIP
 
 
-def test_what_overlaps_at_rest_is_left_alone(samples):
+def test_overlaps_at_rest_are_ignored(samples):
     other = samples.points @ np.diag([0.3, 0.3, 0.3]) + [0, 0, 0.6]
     both = af.SurfaceSamples(np.vstack([samples.points, other]), np.vstack([samples.normals] * 2))
     shapes = [
@@ -176,7 +176,7 @@ def test_a_drag_through_and_back_leaves_nothing(samples):
     assert np.abs(end - start).max() < 4e-3
 
 
-def test_deform_keeps_its_margin_and_says_what_is_held(samples):
+def test_deform_keeps_the_margin_and_reports_held_handles(samples):
     handles = [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, DEEP[1])]
     contact = af.Contact([af.Obstacle(BALL, 0.05)], ground=-1.0)
     field = af.deform(samples, handles, af.DeformOptions(centers=200, handle_weight=100), contact=contact)
@@ -185,7 +185,7 @@ def test_deform_keeps_its_margin_and_says_what_is_held(samples):
     assert field.report.contact.held[0].handle == 1 and field.report.contact.touching > 0
 
 
-def test_what_cannot_be_is_named(samples):
+def test_bad_contact_settings_are_named(samples):
     handles = [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)]
     with pytest.raises(af.InvalidInput, match="margin"):
         af.Obstacle(BALL, -1)
@@ -201,7 +201,7 @@ def test_what_cannot_be_is_named(samples):
 
 
 @pytest.mark.parametrize("kind", ["cuboid", "pin"])
-def test_a_handle_gives_way_where_its_reflection_alone_meets_something(kind):
+def test_a_handle_yields_where_only_its_mirror_image_collides(kind):
     samples = af.sample_surface(trousers(), 6000, seed=0)
     trunk, foot = box([0, 0, 1.1], [0.3, 0.3, 0.3]), box([LEG, 0, FOOT], [0.1, 0.1, 0.1])
     way, side_of_leg = np.array([0.3, 0, 0]), np.array([LEG + THICKNESS, 0, FOOT])
@@ -269,7 +269,7 @@ def test_a_report_is_of_the_planes_found_last():
         ),
     ],
 )
-def test_what_is_too_far_from_the_shape_is_named(contact, named):
+def test_distant_obstacles_are_named(contact, named):
     """It was called points that are not finite, or diverged."""
     samples = af.SurfaceSamples(np.eye(3).repeat(20, 0), np.eye(3).repeat(20, 0))
     with pytest.raises(af.InvalidInput, match=named):
@@ -311,7 +311,7 @@ def test_an_obstacle_that_crosses_the_shape_tears_nothing(extents, center):
     assert np.abs(again(samples.points) - field(samples.points)).max() < ALIKE
 
 
-def test_what_crosses_is_named():
+def test_crossing_obstacles_are_named():
     ball = solid(trimesh.creation.icosphere(3, 0.3), [0, 0, 0.7])
     contact = af.Contact([af.Obstacle(ball), af.Obstacle(box_at(*CROSSINGS["plate"]))])
     handles = [af.Cuboid(matrix, matrix) for matrix in (LEFT, RIGHT)]
@@ -376,7 +376,7 @@ def test_a_body_that_falls_lands_on_the_ground(samples):
 
 
 @pytest.mark.parametrize("handles", [[LEFT], [LEFT, RIGHT]])
-def test_a_plate_that_moves_faster_than_it_is_thick_takes_the_shape_along(samples, handles):
+def test_a_plate_faster_than_its_thickness_pushes_the_shape(samples, handles):
     """The plate is 0.03 thick and rises by 0.2 a frame. A handle over it gives way."""
     ends = []
     for rounding in (0.0, 1e-12):
@@ -437,7 +437,7 @@ def test_a_drag_onto_a_ball_ends_where_more_steps_end(samples):
     assert held.handle == 1 and held.by == "obstacles[0]"
 
 
-def test_a_report_is_of_the_contact_that_is_set(samples):
+def test_a_report_describes_the_current_contact(samples):
     pressed = live(samples, af.Contact([af.Obstacle(BALL)]))
     pressed.solve([LEFT, turned(0, shift=(0, 0.3, -1.2)) @ RIGHT])
     assert pressed.report.contact.touching > 0
@@ -655,7 +655,7 @@ def test_no_vertex_at_a_tip_is_inside(name, function):
         assert shape.report.flipped_share < FLIPPED
 
 
-def test_a_cancelled_contact_is_as_if_it_had_not_been_asked_for():
+def test_a_cancelled_contact_leaves_the_solver_unchanged():
     vertices, triangles = SHAPES["urchin"]()
     samples = af.sample_mesh(vertices, triangles, COUNT, seed=0)
     live, free = (af.LiveDeformer(samples, [af.Cuboid(TOP, TOP)], QUICK_LIVE) for _ in range(2))

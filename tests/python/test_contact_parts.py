@@ -144,7 +144,7 @@ def test_a_report_counts_parts_that_pass_through_each_other():
 
 
 @pytest.mark.parametrize(("degrees", "steps"), [(35, 0), (50, 20)], ids=["in one go", "dragged"])
-def test_what_lies_between_handles_that_give_way_is_not_squashed(degrees, steps):
+def test_parts_between_yielding_handles_are_not_squashed(degrees, steps):
     """Six boxes along one leg turn into the other leg, each held back in a way of its own."""
     samples = af.sample_surface(trousers(), 6000, seed=0)
     rest = [box([0, 0, 1.1], [0.3] * 3), box([-LEG, 0, FOOT], [0.1] * 3)]

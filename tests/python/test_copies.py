@@ -192,7 +192,7 @@ def plain(value):
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("kind", VALUES)
-def test_values_are_copied_whole(kind, way):
+def test_copies_have_equal_values(kind, way):
     one = VALUES[kind]()
     again = WAYS[way](one)
     assert type(again) is type(one) and again is not one and plain(again) == plain(one)
@@ -207,7 +207,7 @@ def test_values_are_copied_whole(kind, way):
         assert again.report == one.report
 
 
-def test_every_public_class_travels_or_says_what_to_send():
+def test_every_public_class_pickles_or_names_a_substitute():
     covered = {type(VALUES[name]()) for name in VALUES} | {type(DESCRIBED[name]()) for name in DESCRIBED}
     others = (*OPTIONS, *BOUND, *NO_VALUES, "RadialField", "NeuralSdf", "Cancelled")
     covered |= {getattr(af, name) for name in others}
@@ -216,7 +216,7 @@ def test_every_public_class_travels_or_says_what_to_send():
 
 
 @pytest.mark.parametrize("name", BOUND)
-def test_what_belongs_to_its_process_says_what_to_send(name, tmp_path):
+def test_unpicklable_objects_name_a_substitute(name, tmp_path):
     mesh, handles = sphere(1.0, 2), [af.PointHandle([0, 0, 1], [0, 0, 1])]
     samples = af.sample_mesh(*mesh, count=100)
     with af.PointCacheWriter(tmp_path / "one.pc2", 2, 1) as writer:
@@ -237,7 +237,7 @@ def test_what_belongs_to_its_process_says_what_to_send(name, tmp_path):
             way(one)
 
 
-def test_copied_samples_are_drawn_anew_and_unpickled_ones_say_that_they_are_not():
+def test_copied_samples_redraw_and_unpickled_ones_refuse():
     samples = af.sample_mesh(*sphere(1.0, 2), count=100)
     options = af.DeformOptions(field="neural", iterations=1, width=4, layers=1, fresh_samples=5)
     handles = [af.PointHandle([0, 0, 1], [0, 0, 1])]
@@ -260,7 +260,7 @@ ODD = (None, "x", b"x", [], np.array([[np.nan] * 3]), np.full((1, 2), 1e300), -1
 
 
 @pytest.mark.parametrize("kind", STATED)
-def test_a_damaged_pickle_is_refused_or_is_whole(kind):
+def test_a_damaged_pickle_is_refused_or_complete(kind):
     state = VALUES[kind]().__reduce_ex__(2)[2]
     for number in range(len(state)):
         for odd in ODD:
@@ -300,7 +300,7 @@ def test_a_pool_of_processes_takes_a_field():
         assert np.array_equal(pool.submit(moved_points, field, points).result(), field(points))
 
 
-def test_a_frame_is_equal_to_frames_alone():
+def test_a_frame_equals_only_frames():
     frame = af.Frame([0, 0, 0], 1.0)
     assert frame == af.Frame([0, 0, 0], 1.0) != af.Frame([0, 0, 0], 2.0)
     assert frame != 1 and frame not in [None, "frame"]

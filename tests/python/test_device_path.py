@@ -161,7 +161,7 @@ def test_divergence_is_noticed_and_the_last_good_state_kept():
 
 @needs_cuda
 @pytest.mark.parametrize("terms", TERMS.values(), ids=TERMS)
-def test_losses_and_their_gradients_on_a_cuda_device_equal_the_kernels(terms):
+def test_losses_and_gradients_on_cuda_equal_the_kernels(terms):
     results = []
     for device in ("cpu", "cuda"):
         probe = testing.LossProbe(cases.bar_samples(60), cases.bar_handles(30.0), device=device, **terms)
@@ -232,7 +232,7 @@ def test_a_name_of_no_device_is_refused(name):
         af.deform(cases.bar_samples(100), cases.bar_handles(40.0), af.DeformOptions(device=name))
 
 
-def test_a_device_that_is_not_there_is_refused_with_the_reason():
+def test_a_missing_device_is_refused_with_the_reason():
     if torch.cuda.is_available():
         assert af.device_report() == "a CUDA device was found"
         with pytest.raises(af.InvalidInput, match="device: 'cuda:99'; the last CUDA device is 'cuda:"):

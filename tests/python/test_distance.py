@@ -262,7 +262,7 @@ def test_vdb_is_a_level_set_at_its_place(tmp_path):
     assert np.array_equal(read, np.clip(values, -band, band))
 
 
-def test_vdb_without_openvdb_says_what_is_needed(tmp_path, monkeypatch):
+def test_vdb_without_openvdb_names_the_package(tmp_path, monkeypatch):
     monkeypatch.setitem(grids.sys.modules, "openvdb", None)
     monkeypatch.setattr(grids.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(ImportError, match="openvdb"):
@@ -300,7 +300,7 @@ def test_cancel():
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".vdb"])
-def test_what_is_no_grid_is_not_written(tmp_path, suffix):
+def test_bad_grids_are_not_written(tmp_path, suffix):
     values, origin, spacing = af.sdf_grid(Ball(), 4)
     bad = [
         ("values", (values * np.nan, origin, spacing)),

@@ -72,7 +72,7 @@ class Stretch(af.Energy):
 
 
 @pytest.mark.parametrize("kind", ["neural", "radial"])
-def test_our_own_stretch_in_python_is_a_second_share_of_it(kind):
+def test_stretch_in_python_equals_more_rigidity(kind):
     """Half of the stretch is ours, half is the library's: a solve with rigidity 2 is the same one."""
     vertices, triangles = sphere(10.0, 3)
     samples = af.sample_mesh(vertices + np.array([3, 0, -2]), triangles, 600)
@@ -108,7 +108,7 @@ class Curvature(af.Energy):
         )
 
 
-def test_second_derivatives_come_where_they_are_asked_for():
+def test_second_derivatives_are_given_on_request():
     samples = cases.bar_samples()
     held = cases.bar_handles()
     soft, stiff = (
@@ -156,7 +156,7 @@ def test_the_parameter_gradient_is_that_of_differences(composed):
     assert np.isfinite(loss)
 
 
-def test_what_it_is_given_is_in_mesh_coordinates():
+def test_an_energy_receives_mesh_coordinates():
     samples = samples_in_metres()
     mine = Spring([0, 0, 0], 0.0)
     af.deform(
@@ -193,7 +193,7 @@ class Mine(Exception):
 
 
 @pytest.mark.parametrize("kind", ["neural", "radial"])
-def test_what_it_raises_comes_through_unchanged(kind):
+def test_errors_of_an_energy_reach_the_caller(kind):
     error = Mine("in the energy")
 
     def fails(jets):
@@ -235,7 +235,7 @@ def n(jets):
         (lambda j: (1.0, np.full((n(j), 3), np.inf)), "derivatives are NaN or infinite"),
     ],
 )
-def test_what_does_not_fit_is_named(returned, word):
+def test_bad_results_of_an_energy_are_named(returned, word):
     def good(jets):
         return af.EnergyValue(0.0)
 
@@ -247,12 +247,12 @@ def test_what_does_not_fit_is_named(returned, word):
 @pytest.mark.parametrize(
     "wrong, word", [(5, "energies: .*int"), ([5], r"energies\[0\]: .*int"), ([af.Energy], r"energies\[0\]")]
 )
-def test_what_is_no_energy_is_refused(wrong, word):
+def test_objects_that_are_no_energy_are_refused(wrong, word):
     with pytest.raises(af.InvalidInput, match=word):
         af.deform(cases.bar_samples(50), cases.bar_handles(), energies=wrong)
 
 
-def test_an_order_that_there_is_not_is_refused():
+def test_an_unknown_order_is_refused():
     def mine(jets):
         return af.EnergyValue(0.0)
 

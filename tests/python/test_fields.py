@@ -91,7 +91,7 @@ def test_inverse_returns_to_the_start(bent, samples):
     assert np.quantile(error, 0.95) < tolerances.NEWTON_INVERSE
 
 
-def test_inverse_reports_what_it_cannot_find(bent):
+def test_inverse_reports_points_without_a_preimage(bent):
     back = bent.inverse([[np.inf, 0.0, 0.0], [np.nan, 0.0, 0.0], [0.0, 0.0, 0.0]])
     assert np.isnan(back[:2]).all()
     assert np.allclose(bent(back[2:]), 0.0, atol=2e-6)

@@ -48,7 +48,7 @@ def test_any_reader_of_safetensors_opens_them(name, examples):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_is_read_is_written_again(name, examples, tmp_path):
+def test_a_loaded_file_is_saved_unchanged(name, examples, tmp_path):
     archives.load(examples[name]).save(tmp_path / "again")
     assert (tmp_path / "again").read_bytes() == examples[name].read_bytes()
     texts, arrays = archives.read(examples[name])
@@ -104,7 +104,7 @@ HEADERS = [  # what is wrong with the header, and the header
 
 
 @pytest.mark.parametrize(("text", "header"), HEADERS, ids=[text for text, _ in HEADERS])
-def test_headers_that_are_none(text, header, tmp_path):
+def test_bad_headers_are_refused(text, header, tmp_path):
     assert text in refusal(tmp_path / "x", archives.joined(header, b""))
 
 
@@ -159,7 +159,7 @@ def test_sizes_are_checked_before_memory_is_asked_for(examples, tmp_path):
         ({"format": None}, "missing"),
     ],
 )
-def test_what_a_file_says_of_itself(change, word, examples, tmp_path):
+def test_a_file_describes_its_contents(change, word, examples, tmp_path):
     texts, arrays = archives.read(examples["radial"])
     changed = {k: v for k, v in {**texts, **change}.items() if v is not None}
     assert word in refusal(tmp_path / "x", archives.packed(changed, arrays))
@@ -234,7 +234,7 @@ def test_foreign_files_and_places(examples, tmp_path):
         af.NeuralSdf.load(odd)
 
 
-def test_reports_hold_what_json_holds(examples, tmp_path):
+def test_reports_contain_only_json_values(examples, tmp_path):
     sdf = af.NeuralSdf.load(examples["sdf"])
     sdf._report = af.InverseReport(
         error_mean=float("inf"), error_max=np.float64(0.5), iterations=3, seconds=float("nan")
@@ -261,7 +261,7 @@ def written(compressed):
 
 
 @pytest.mark.parametrize("compressed", [False, True])
-def test_what_is_written_is_read(compressed, tmp_path):
+def test_written_arrays_are_read(compressed, tmp_path):
     (tmp_path / "a.npz").write_bytes(written(compressed))
     for source in (written(compressed), tmp_path / "a.npz"):
         found = read_arrays(source, set(ARRAYS))
@@ -371,7 +371,7 @@ def folder(request, tmp_path):
     return path
 
 
-def test_what_is_written_is_read_again(folder):
+def test_written_fields_are_read_again(folder):
     field = af.deform(bar_samples(300), bar_handles(), af.DeformOptions(iterations=3))
     field.save(folder / "ü 场.safetensors")
     points = bar_samples(50).points

@@ -132,7 +132,7 @@ class Mine(Exception):
     ],
     ids=["sample", "extract", "extract_deformed", "grid"],
 )
-def test_what_it_raises_comes_through_unchanged(call, after):
+def test_errors_of_a_function_reach_the_caller(call, after):
     error = Mine("in the function")
 
     class Fails(Ball):
@@ -185,7 +185,7 @@ def test_cancel_takes_effect():
     assert ball.calls < 20
 
 
-def test_one_thread_at_a_time_is_let_in():
+def test_a_function_is_called_by_one_thread_at_a_time():
     """Four callers of one object: no two are inside of it at once."""
     inside, most = [], []
 
@@ -257,7 +257,7 @@ def test_a_bound_on_the_gradient_is_taken(bound):
 
 
 @pytest.mark.parametrize("bound", [0.0, -1.0, np.nan, "steep", [1.0, 2.0]])
-def test_a_bound_that_is_none_is_named(bound):
+def test_a_bad_gradient_bound_is_named(bound):
     class Bounded(Ball):
         gradient_bound = bound
 
@@ -294,7 +294,7 @@ def test_a_subclass_that_forgets_its_base_is_refused():
 
 
 @pytest.mark.parametrize("wrong", [None, 5, lambda p: p])
-def test_what_is_no_function_is_refused(wrong):
+def test_objects_that_are_no_function_are_refused(wrong):
     with pytest.raises((af.InvalidInput, TypeError), match=r"sdf|incompatible"):
         af.sample_surface(wrong)
     with pytest.raises((af.InvalidInput, TypeError)):
@@ -353,7 +353,7 @@ NO_SURFACES = {
 
 
 @pytest.mark.parametrize("name", NO_SURFACES)
-def test_what_is_no_surface_is_told_in_bounded_work(name):
+def test_functions_without_a_surface_end_in_bounded_work(name):
     values, sentence = NO_SURFACES[name]
     function = Counted(values)
     with pytest.raises(af.InvalidInput, match=f"sdf: .*({sentence})"):

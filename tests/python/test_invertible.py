@@ -93,7 +93,7 @@ def bent():
     return af.deform(af.sample_mesh(vertices, triangles, 3000, seed=0), handles, af.DeformOptions(**SMALL))
 
 
-def test_handles_are_followed_and_what_comes_back_is_where_it_was(bent):
+def test_handles_are_followed_and_the_inverse_returns(bent):
     assert bent.report.handle_error_mean < 0.05 and bent.report.flipped_share == 0
     assert bent.report.iterations == 30 and len(bent.report.loss) == 30  # an iteration is several steps
     points = np.random.default_rng(1).uniform(-3, 3, (20_000, 3))
@@ -105,7 +105,7 @@ def test_handles_are_followed_and_what_comes_back_is_where_it_was(bent):
     assert np.isfinite(broken[0]).all() and np.isnan(broken[1:]).all()
 
 
-def test_the_fields_own_derivatives_are_finite_differences(bent):
+def test_field_derivatives_equal_finite_differences(bent):
     points, step = np.random.default_rng(2).uniform(-1, 1, (50, 3)), 2e-3
     for axis in range(3):
         offset = step * np.eye(3)[axis]
@@ -116,7 +116,7 @@ def test_the_fields_own_derivatives_are_finite_differences(bent):
         assert np.abs(bend - hessian).max() < 0.02 * np.abs(hessian).max()
 
 
-def test_files_hold_it_whole(bent, tmp_path):
+def test_files_restore_the_field(bent, tmp_path):
     bent.save(tmp_path / "field.safetensors")
     again = af.DeformationField.load(tmp_path / "field.safetensors")
     points = np.random.default_rng(3).uniform(-1, 1, (100, 3))
@@ -144,7 +144,7 @@ def test_same_seed_same_bits_whatever_the_threads():
     assert np.array_equal(*(field(samples.points[:100]) for field in fields))
 
 
-def test_what_an_invertible_field_cannot_do_is_named():
+def test_limits_of_an_invertible_field_are_named():
     vertices, triangles, handles = bar()
     samples = af.sample_mesh(vertices, triangles, 500, seed=0)
     for option, message in (

@@ -69,7 +69,7 @@ def test_bending_a_bar(samples):
     assert abs(middle[1]) < 0.02  # the motion is in the xz plane
 
 
-def test_steps_never_raise_what_is_minimised(samples):
+def test_steps_never_raise_the_energy(samples):
     live = deformer(samples)
     targets = [LEFT, turned(120, 2, [0, 0.5, 0]) @ RIGHT]
     values = []
@@ -263,7 +263,7 @@ def test_ten_thousand_motions_leave_no_trace():
     assert np.abs(live.field(samples.points) - samples.points).max() < 1e-8
 
 
-def test_a_finger_of_a_hand_moves_nearly_alone(data_dir):
+def test_a_finger_moves_without_its_neighbours(data_dir):
     """The middle finger turned aside by 25 degrees, the palm held: how far the other fingertips go, by the
     hand's length (1.48)."""
     samples = published_samples(data_dir / "neural_sdf" / "hand.pt")
@@ -420,7 +420,7 @@ def other_leg_moves(samples, interior):
     return np.linalg.norm(field(LEGS[-1]) - LEGS[-1]), live
 
 
-def test_a_leg_of_a_fork_moves_alone(fork):
+def test_one_leg_of_a_fork_leaves_the_other_in_place(fork):
     apart, live = other_leg_moves(fork, True)
     together, plain = other_leg_moves(fork, False)
     assert apart < 0.04 * 1.5  # of the fork's length

@@ -54,7 +54,7 @@ def test_a_mesh_file_is_read_with_its_vertices_and_polygons(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", [name for name in FILES if name.endswith(".obj")])
-def test_an_obj_keeps_its_lines_but_for_positions_and_normals(name, tmp_path):
+def test_an_obj_keeps_lines_other_than_positions_and_normals(name, tmp_path):
     mesh = read(tmp_path, name)
     formats.write_moved(tmp_path / "moved.obj", ".obj", mesh, mesh.vertices)
 
@@ -148,7 +148,7 @@ def test_an_stl_keeps_its_header_names_and_attributes(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", [name for name in FILES if name.endswith(".off")])
-def test_an_off_keeps_its_rows_but_for_positions_and_normals(name, tmp_path):
+def test_an_off_keeps_rows_other_than_positions_and_normals(name, tmp_path):
     mesh = read(tmp_path, name)
     formats.write_moved(tmp_path / "moved.off", ".off", mesh, mesh.vertices)
     before, after = FILES[name][0], (tmp_path / "moved.off").read_bytes()
@@ -168,7 +168,7 @@ def test_an_off_keeps_its_rows_but_for_positions_and_normals(name, tmp_path):
 @pytest.mark.parametrize(
     "name", ["colours.obj", "texture.obj", "colours.ply", "wedges.ply", "face_colours.off", "plain.stl"]
 )
-def test_another_format_gets_what_it_has_a_place_for(name, suffix, tmp_path):
+def test_another_format_gets_the_attributes_it_supports(name, suffix, tmp_path):
     mesh = read(tmp_path, name)
     other = tmp_path / f"other{suffix}"
     formats.write_moved(other, name[-4:], mesh, turned(mesh.vertices))
@@ -311,7 +311,7 @@ def test_doubles_stay_doubles_where_the_format_has_them(suffix, tmp_path):
     assert formats.write(tmp_path / "b.stl", Mesh(shape.vertices - SURVEY, sizes, mesh.corners)) == ""
 
 
-def test_a_file_of_single_precision_says_what_it_loses(tmp_path, capsys):
+def test_a_single_precision_file_reports_its_loss(tmp_path, capsys):
     shape, far = odd_meshes.ball(), FILES["far.obj"][1]
     assert np.array_equal(read(tmp_path, "far.obj").vertices, far.vertices)
     for form in odd_meshes.ORDERS:

@@ -87,7 +87,7 @@ def test_values_and_gradients():
     assert sdf.closed and np.isclose(sdf.frame.scale, 50 * af.MeshSdf(V, F).frame.scale)
 
 
-def test_samples_are_uniform_on_what_is_outside():
+def test_samples_are_uniform_on_the_outer_surface():
     half = np.array([0.9, 0.6, 0.3])
     V, F = joined(meshes.box(half), moved(meshes.sphere(0.2, 2), [0.1, 0, 0]))  # the ball is hidden
     sdf = af.MeshSdf(V, F)

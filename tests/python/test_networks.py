@@ -123,7 +123,7 @@ def test_layers_that_do_not_fit_are_refused():
         make(weights, biases)([[0.0, np.nan, 0.0]])
 
 
-def test_layers_are_what_from_layers_takes(sdf):
+def test_layers_are_arguments_of_from_layers(sdf):
     weights, biases, octaves, frequency, sharpness = sdf.layers
     again = af.NeuralSdf.from_layers(weights, biases, octaves, frequency, sharpness)
     points = np.random.default_rng(5).uniform(-1, 1, (100, 3))

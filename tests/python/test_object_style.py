@@ -63,7 +63,7 @@ def test_between_a_sphere_and_a_cube_lie_superquadrics():
     assert reached[0] + 0.05 < reached[1] < reached[2] - 0.02 < 1
 
 
-def test_directions_in_which_nothing_is_left_are_kept():
+def test_unmapped_directions_are_kept():
     """Through a torus's hole."""
     style = af.ObjectStyle(*meshes.torus())
     up = np.array([[0, 0, 1.0], [0, 0, -1.0]])
@@ -72,7 +72,7 @@ def test_directions_in_which_nothing_is_left_are_kept():
     assert np.abs(style.normals(outwards) - outwards).max() < 0.02
 
 
-def test_what_is_no_style_is_named():
+def test_bad_style_objects_are_named():
     vertices, triangles = meshes.box()
     flat = vertices * [1, 1, 0]
     for mesh, message in (
@@ -93,7 +93,7 @@ def test_what_is_no_style_is_named():
         style.turned(np.eye(3) * 2)
 
 
-def test_value_and_cotangent_equal_autograd_finite_differences_and_the_composition():
+def test_value_and_cotangent_equal_autograd_and_differences():
     rng = np.random.default_rng(1)
     jacobians = rng.normal(size=(400, 3, 3))
     jacobians = jacobians[np.abs(np.linalg.det(jacobians)) > 0.1][:101]

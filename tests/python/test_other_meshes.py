@@ -100,7 +100,7 @@ def test_warp_moves_points_and_curves(meshes, saved, tmp_path, suffix):
     assert np.abs(read_points - field.apply(points, strength=0.5)).max() < 1e-6
 
 
-def test_warp_carries_what_belongs_to_a_body(meshes, saved, tmp_path, capsys):
+def test_warp_carries_attached_objects(meshes, saved, tmp_path, capsys):
     V, F = meshes[0]
     body, hair, output = (tmp_path / name for name in ("body.obj", "hair.xyz", "out.xyz"))
     body.write_text(

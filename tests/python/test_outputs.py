@@ -95,7 +95,7 @@ def test_places_that_cannot_be_named(tmp_path):
     assert names(tmp_path) == [long.name]
 
 
-def test_an_error_leaves_what_was_there(tmp_path):
+def test_an_error_keeps_the_existing_file(tmp_path):
     (tmp_path / "x").write_text("old")
     with pytest.raises(ZeroDivisionError), whole_file(tmp_path / "x") as partial:
         partial.write_text("new")
@@ -122,7 +122,7 @@ time.sleep(60)
 """
 
 
-def test_what_a_killed_process_left_is_removed_and_no_other(tmp_path):
+def test_only_files_of_killed_processes_are_removed(tmp_path):
     start = [sys.executable, "-c", HELD]
     dead = subprocess.Popen([*start, str(tmp_path / "x.ply")], stdout=subprocess.PIPE, text=True)
     alive = subprocess.Popen([*start, str(tmp_path / "x.ply")], stdout=subprocess.PIPE, text=True)

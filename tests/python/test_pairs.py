@@ -312,7 +312,7 @@ def test_an_output_is_finished_once(method, tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers here")
-def test_a_signal_handler_that_asks_the_solver_at_work_is_told_so():
+def test_a_signal_handler_cannot_reenter_the_solver():
     """It runs on the thread that holds the solver, and would wait for itself for ever."""
     ball = np.random.default_rng(0).normal(size=(3000, 3))
     samples = af.SurfaceSamples(ball / np.linalg.norm(ball, axis=1, keepdims=True), ball)

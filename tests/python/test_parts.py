@@ -116,7 +116,7 @@ def test_each_small_thing_far_from_the_rest_has_a_sample():
     assert np.array_equal(few, many[:1000])
 
 
-def test_many_small_things_take_a_share_of_the_samples_alone():
+def test_many_small_parts_take_only_a_share_of_the_samples():
     rng = np.random.default_rng(0)
     speck, ball = meshes.sphere(1e-4, 0), meshes.sphere(1.0, 3)
     specks = rng.uniform(-20, 20, (3000, 1, 3)) + speck[0]
@@ -217,7 +217,7 @@ def test_a_saved_field_keeps_the_sides(tmp_path):
         ("excess", -1.0, "none may be negative"),
     ],
 )
-def test_what_nodes_see_is_checked_when_it_is_read(name, value, message, tmp_path):
+def test_visibility_of_nodes_is_checked_on_loading(name, value, message, tmp_path):
     field = solved(0.02)[3]
     field.save(tmp_path / "whole.safetensors")
     texts, arrays = archives.read(tmp_path / "whole.safetensors")

@@ -30,7 +30,7 @@ def motion():
 
 
 @pytest.mark.parametrize("suffix", ["pc2", "mdd", "PC2"])
-def test_what_is_written_is_read(suffix, motion, tmp_path):
+def test_written_caches_are_read(suffix, motion, tmp_path):
     path = write(tmp_path / f"x.{suffix}", motion, start=10, step=0.5, fps=25)
     assert path.stat().st_size == HEADERS[suffix.lower()] + 12 * POINTS * FRAMES
     with PointCacheReader(path) as cache:
@@ -47,7 +47,7 @@ def test_what_is_written_is_read(suffix, motion, tmp_path):
                 cache[outside]
 
 
-def test_the_bytes_are_those_of_the_formats(motion, tmp_path):
+def test_bytes_follow_the_formats(motion, tmp_path):
     pc2 = write(tmp_path / "x.pc2", motion, start=3, step=2).read_bytes()
     assert pc2[:12] == b"POINTCACHE2\0"
     assert struct.unpack("<2i2fi", pc2[12:32]) == (1, POINTS, 3.0, 2.0, FRAMES)
@@ -102,7 +102,7 @@ def test_a_cache_has_the_frames_that_were_promised(written, motion, tmp_path):
     assert (tmp_path / "x.mdd").read_bytes() == before and names(tmp_path) == ["x.mdd"]
 
 
-def test_an_error_in_the_block_leaves_what_was_there(motion, tmp_path):
+def test_an_error_in_the_block_keeps_the_existing_cache(motion, tmp_path):
     with (
         pytest.raises(ZeroDivisionError),
         PointCacheWriter(tmp_path / "x.pc2", POINTS, FRAMES) as cache,
@@ -147,7 +147,7 @@ def test_several_caches_take_their_places_together(motion, tmp_path):
         ({"path": "x"}, "no extension"),
     ],
 )
-def test_what_makes_no_cache(settings, text, tmp_path):
+def test_bad_cache_settings_are_named(settings, text, tmp_path):
     settings = {"path": "x.mdd", "points": POINTS, "frames": FRAMES} | settings
     path = tmp_path / settings.pop("path")
     with pytest.raises(af.InvalidInput, match=text) as error:
@@ -257,7 +257,7 @@ def test_damaged_files_are_named(suffix, damage, text, motion, tmp_path):
     assert peak() - before < 50_000  # kB: nothing of that size
 
 
-def test_frames_that_are_not_finite_or_gone_are_named(motion, tmp_path):
+def test_infinite_and_missing_frames_are_named(motion, tmp_path):
     path = write(tmp_path / "x.pc2", motion)
     content = bytearray(path.read_bytes())
     at = 32 + 12 * POINTS * 2 + 12 * 3
@@ -272,7 +272,7 @@ def test_frames_that_are_not_finite_or_gone_are_named(motion, tmp_path):
             cache[4]
 
 
-def test_what_is_no_file_of_ours_is_named(tmp_path):
+def test_foreign_files_are_named(tmp_path):
     for path in (tmp_path, tmp_path / "none.pc2", tmp_path / "x.abc"):
         with pytest.raises(af.InvalidInput, match=re.escape(str(path))):
             PointCacheReader(path)

@@ -51,7 +51,7 @@ def test_a_network_refines_the_radial_result(samples, handles, radial, tmp_path)
     assert np.array_equal(again(samples.points[:50]), refined(samples.points[:50]))
 
 
-def test_fast_is_the_default_unless_a_network_is_asked_for(handles):
+def test_radial_is_the_default_without_network_options(handles):
     samples = bar_samples(1500)
     assert isinstance(af.deform(samples, handles), af.RadialField)
     few = af.DeformOptions(iterations=3, bending=2.0, barrier=1.0)
@@ -145,7 +145,7 @@ def test_stylize_radial_turns_normals_and_holds_the_lowest_sample(samples):
     assert np.abs(unchanged(samples.points) - samples.points).max() < 1e-6
 
 
-def test_what_a_radial_field_cannot_do_is_named(samples, handles):
+def test_limits_of_a_radial_field_are_named(samples, handles):
     with pytest.raises(af.InvalidInput, match=r"needs? field='neural'"):
         af.deform(samples, handles, af.DeformOptions(field="radial", invertibility=1.0))
     with pytest.raises(af.InvalidInput, match="'radial', 'neural' or 'invertible'"):
@@ -166,7 +166,7 @@ def test_few_samples_carry_few_centers(handles):
     assert af.distortion(field, bar_samples().points).flipped_share == 0.0
 
 
-def test_the_arrays_of_a_field_are_all_of_it(samples):
+def test_a_field_is_restored_from_its_arrays(samples):
     """The formula of `arrays`, in NumPy; the test in Blender evaluates interior distances as well."""
     held = af.PointHandle([0.0, 0.0, 0.5], [0.0, 0.0, 0.8], reach=0.6)
     field = af.LiveDeformer(samples, [held]).solve([[0.0, 0.0, 0.8]])

@@ -69,7 +69,7 @@ def test_an_anchor_holds_and_a_handle_without_reach_frees_all(body):
     assert np.linalg.norm(free(head) - head, axis=1).min() > 0.05
 
 
-def test_boxes_and_regions_reach_from_what_they_hold():
+def test_boxes_and_regions_reach_from_their_samples():
     samples = bar_samples(3000)
     target = shift([0, 0, 0.3]) @ RIGHT
     inside = np.flatnonzero(samples.points[:, 0] > 1.5)

@@ -77,7 +77,7 @@ def test_a_report_survives_its_file(made, kind, tmp_path):
     assert load(tmp_path / "file").report == made[kind].report
 
 
-def test_what_was_not_measured_has_no_report(made, tmp_path):
+def test_unmeasured_objects_have_no_report(made, tmp_path):
     layers = made["FitReport"].layers
     sdf = af.NeuralSdf.from_layers(*layers)
     sdf.save(tmp_path / "bare")
@@ -97,7 +97,7 @@ def test_reports_from_before_kinds_were_written_are_read(made):
 
 
 @pytest.mark.parametrize("text", ["{}", '{"kind": "Sermon"}', '{"author": "somebody else"}'])
-def test_what_another_program_wrote_is_no_report(text):
+def test_reports_of_other_programs_are_ignored(text):
     assert _report_files.from_json(text) is None
 
 
@@ -144,12 +144,12 @@ def test_older_names_are_the_same_classes():
         lambda s, t: af.deform_curve(np.zeros((3, 2)), [], af.CurveOptions(), t),
     ],
 )
-def test_what_comes_after_the_options_goes_by_name(call):
+def test_arguments_after_options_are_keyword_only(call):
     with pytest.raises(TypeError):
         call(cases.bar_samples(50), af.Task())
 
 
-def test_what_a_wrap_tells_comes_back_equal(tmp_path):
+def test_a_wrap_report_is_restored_equal(tmp_path):
     vertices, triangles = sphere(1.0, 1)
     options = af.WrapOptions(centers=20, stages=2, iterations=1, threads=1)
     landmarks = [(vertices[i], 2 * vertices[i]) for i in (0, 3, 7)]
@@ -253,7 +253,7 @@ def test_stretches_of_the_mesh_s_own_triangles_are_in_the_report():
     assert field.report.min_determinant <= np.prod(stretches, axis=1).min() + rounding
 
 
-def test_triangles_too_long_for_the_motion_are_told_of_with_a_place():
+def test_triangles_too_long_for_the_motion_are_located():
     # Slivers that reach along the whole bar, in a plane: its one end comes round to behind the other one.
     vertices, triangles = strips(40)
     rows = np.linspace(-0.15, 0.15, 30)

@@ -118,7 +118,7 @@ def test_the_frame_turns_and_scales_with_the_mesh():
     assert np.allclose(moved.center, 3e4 * (motion[:3, :3] @ rest.center + motion[:3, 3]), rtol=1e-9)
 
 
-def test_what_is_small_and_far_hardly_moves_the_frame():
+def test_small_distant_parts_hardly_move_the_frame():
     """A thousandth of the length, a hundred lengths away: a part in ten thousand of the frame."""
     v, f = meshes.sphere()
     rest = af.sample_mesh(v, f, count=10).frame

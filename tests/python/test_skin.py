@@ -117,7 +117,7 @@ def test_unwelded_and_torn_meshes_get_the_same_weights(legs, weights):
     assert np.allclose(torn.sum(1), 1, atol=1e-5)  # vertices without triangles too
 
 
-def test_loose_parts_take_what_lies_below_and_small_closed_ones_one_motion(legs, weights):
+def test_loose_parts_follow_the_surface_below(legs, weights):
     V, F = legs
     samples = af.sample_mesh(V, F, 2000)
     points, normals = np.asarray(samples.points), np.asarray(samples.normals)
@@ -405,14 +405,14 @@ def test_rings_about_a_leg_go_with_it_on_both_sides_of_the_middle(skinned, side,
 
 
 @pytest.mark.parametrize("side", "LR")
-def test_a_small_part_between_limbs_goes_whole_with_one_bone(skinned, side):
+def test_a_small_part_between_limbs_follows_one_bone(skinned, side):
     _, parts, weights = skinned
     button = weights[parts == f"button.{side}"]
     assert (button == button[0]).all()
     assert np.count_nonzero(button[0]) == 1
 
 
-def test_a_part_goes_with_its_own_bones_alone(skinned):
+def test_a_part_follows_only_its_bones(skinned):
     _, parts, weights = skinned
     trunk = weights[parts == "trunk"]
     assert share(trunk, "Arm.L", "Arm.R", "Leg.L", "Leg.R", "Head").max() == 0

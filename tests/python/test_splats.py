@@ -130,7 +130,7 @@ def affine(tmp_path, motion):
     return af.DeformationField.load(saved)
 
 
-def test_a_rigid_motion_gives_the_same_picture_to_a_camera_that_moves_along(tmp_path):
+def test_a_rigid_motion_keeps_the_picture_of_a_moving_camera(tmp_path):
     motion, field = MOTION, affine(tmp_path, MOTION)
     rest = splats()
     moved = field.apply_to(rest)
@@ -170,7 +170,7 @@ def test_covariances_are_those_of_points_that_the_field_moves():
         assert np.linalg.norm(drawn - moved[i]) < DRAWN * np.linalg.norm(moved[i])
 
 
-def test_what_is_stretched_or_bent_is_divided_and_keeps_its_moments(tmp_path):
+def test_stretched_splats_are_split_and_keep_their_moments(tmp_path):
     rest = splats(60, harmonics=4, width=0.3)
     field = bent(150.0)
     assert len(field.apply_to(rest, max_stretch=np.inf)) == len(rest) < len(field.apply_to(rest))
@@ -222,7 +222,7 @@ def numbers(splats):
 
 
 @pytest.mark.parametrize("functions", (1, 4, 9, 16))
-def test_changes_are_what_a_motion_adds_to_each_number(functions):
+def test_changes_are_differences_of_moved_numbers(functions):
     rest = splats(1303, functions)  # not a whole number of packs
     prepared, given = af.PreparedSplats(rest), numbers(rest)
     rows, columns = np.full_like(given, np.nan), np.full_like(given.T, np.nan)
@@ -297,7 +297,7 @@ def test_the_command_line_bends_a_scan(tmp_path, capsys):
 # Gaussian splats: their numbers, read, written and refused.
 
 
-def test_a_file_comes_back_and_keeps_what_it_has_besides(tmp_path):
+def test_a_splat_file_keeps_its_other_properties(tmp_path):
     for count in (1, 4, 9, 16):
         given = splats(7, count)
         given.save(tmp_path / "a.ply")
@@ -338,7 +338,7 @@ def test_opaque_and_invisible_splats_stay_so(tmp_path):
         assert field.apply_to(scan).opacities[3] == opacity
 
 
-def test_what_cannot_be_read_is_named(tmp_path):
+def test_bad_splat_files_are_named(tmp_path):
     splats(5, 4).save(tmp_path / "a.ply")
     good = (tmp_path / "a.ply").read_bytes()
     bad = tmp_path / "bad.ply"
@@ -451,7 +451,7 @@ def test_gltf_is_read_back(count, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["a.glb"]
 
 
-def test_what_gltf_cannot_hold_is_named(tmp_path):
+def test_limits_of_gltf_are_named(tmp_path):
     empty = af.GaussianSplats(*(np.zeros((0, *shape)) for shape in ((3,), (4,), (3,), (), (1, 3))))
     with pytest.raises(af.InvalidInput, match="splats"):
         empty.save_gltf(tmp_path / "a.glb")
@@ -509,7 +509,7 @@ def saved_field(folder):
 
 
 @needs_usd
-def test_the_verbs_write_what_they_move_in_each_format(tmp_path):
+def test_verbs_write_moved_splats_in_each_format(tmp_path):
     splats().save(tmp_path / "scan.ply")
     scan, field = tmp_path / "scan.ply", tmp_path / "field.safetensors"
     solve = ["--box", "-inf,-inf,-inf", "-0.5,inf,inf", "--box", "0.5,-inf,-inf", "inf,inf,inf"]

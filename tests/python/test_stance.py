@@ -88,7 +88,7 @@ def test_translations_are_free_and_units_do_not_matter():
     assert value(40.0, 0.0) == pytest.approx(first, rel=1e-12)
 
 
-def test_the_ground_is_what_lies_lowest():
+def test_the_ground_is_the_lowest_part():
     rest = figure()
     for up in ([0, 0, 1], [0, 1, 0], [-1, 0, 0]):
         stance = testing.Stance(rest, up)

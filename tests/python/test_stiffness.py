@@ -75,7 +75,7 @@ def test_thickness_turns_and_scales_with_the_shape():
     assert abs(np.median(mirrored) / np.median(rest) - 1) < SAMPLED  # other samples: corners change places
 
 
-def test_the_energy_of_reports_is_the_one_that_is_minimised():
+def test_reports_contain_the_minimised_energy():
     """Its unit: none. With the same λ everywhere it is stretch + λ·bend."""
     samples = cases.bar_samples(2000)
     options = dict(field="radial", centers=100, bending_unit="cube", bending=3.0)

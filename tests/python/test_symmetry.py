@@ -118,7 +118,7 @@ def test_symmetry_and_weights_agree(body, space):
     assert asymmetry(live.solve(iterations=50), space) < EXACT
 
 
-def test_what_cannot_be_symmetric_is_refused(body):
+def test_bad_symmetries_are_refused(body):
     handles = [TRUNK, leg(1, 10)]
     for options in (
         {"field": "neural"},

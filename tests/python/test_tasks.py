@@ -63,7 +63,7 @@ def seconds(task, **options):
     return time.process_time() - before
 
 
-def test_what_is_cancelled_before_it_begins_ends_at_once():
+def test_a_task_cancelled_before_the_call_ends_it_at_once():
     task = af.Task()
     task.cancel()
     assert seconds(task) < AT_ONCE * seconds(af.Task())
@@ -127,7 +127,7 @@ def interrupted_after(seconds, call):
         timer.join()
 
 
-def test_a_task_is_cancelled_by_it():
+def test_ctrl_c_cancels_the_task():
     task = af.Task()
     options = af.DeformOptions(width=32, layers=3, batch=100, iterations=10_000_000)
     with pytest.raises(KeyboardInterrupt):
@@ -197,7 +197,7 @@ every_call = pytest.mark.parametrize("name", CALLS)
 
 
 @every_call
-def test_each_iteration_is_told_once_with_terms_that_make_its_loss(name):
+def test_each_iteration_is_reported_once_with_its_terms(name):
     call, changes, terms = CALLS[name]
     calls = []
     report = call(calls.append, **changes).report
@@ -218,7 +218,7 @@ def test_watching_changes_nothing(name):
 
 
 @every_call
-def test_stop_iteration_ends_the_call_with_what_was_reached(name):
+def test_stop_iteration_returns_the_present_result(name):
     call, changes, _ = CALLS[name]
 
     def enough(record):
@@ -270,7 +270,7 @@ def test_a_callback_may_cancel():
         af.deform(samples, cases.bar_handles(), options, callback=lambda _: task.cancel(), task=task)
 
 
-def test_what_is_no_function_is_refused():
+def test_a_bad_callback_is_refused():
     with pytest.raises(af.InvalidInput, match=r"^callback: .*int"):
         deformed(5)
 
@@ -299,7 +299,7 @@ def test_a_watched_solve_shows_the_shape_and_ends_the_same(field):
 
 
 @pytest.mark.parametrize("options", [SMALL | {"field": "neural"}, {}])
-def test_the_first_shape_there_is_is_shown(options):
+def test_the_first_shape_is_shown(options):
     """However long is to be waited between two looks."""
     samples, task = bar_samples(2000), af.Task()
     task.watch(samples.points[:50], seconds=1000.0)

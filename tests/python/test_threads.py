@@ -140,7 +140,7 @@ def test_no_thread_of_another_s_is_started():
     assert names.count("arapfields") == 2 and len(names) == 3
 
 
-def test_calls_at_once_have_their_own_numbers_and_torch_keeps_its():
+def test_concurrent_calls_keep_their_thread_counts():
     torch = pytest.importorskip("torch")
     before = torch.get_num_threads()
     torch.set_num_threads(3)
@@ -205,7 +205,7 @@ def test_a_forked_child_works(first):
     assert run_script(FORK.format(first=first)) == "0"
 
 
-def test_more_threads_than_there_may_be():
+def test_too_many_threads_are_refused():
     assert np.array_equal(numbers(deformed(1024)), numbers(deformed(1)))
     with pytest.raises(af.InvalidInput, match="threads"):
         deformed(1025)
@@ -253,7 +253,7 @@ BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "busy.py"
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["deform", "live"])
 @pytest.mark.parametrize("first", ["torch", "arapfields"])
-def test_other_processes_cost_their_share_alone(name, first):
+def test_other_processes_cost_only_their_share(name, first):
     spec = importlib.util.spec_from_file_location("busy", BENCHMARK)
     busy = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(busy)
@@ -357,7 +357,7 @@ for byte in range(int(sys.argv[2])):
 """
 
 
-def test_threads_lock_bytes_of_one_file_and_leave_none_locked(tmp_path):
+def test_threads_lock_and_unlock_bytes_of_one_file(tmp_path):
     with (tmp_path / "lock").open("ab") as file, ThreadPoolExecutor(THREADS) as pool:
 
         def work(byte):

@@ -71,7 +71,7 @@ def test_keys_follow_a_known_map_onto_other_triangles(figure):
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_how_a_shape_grows_across_its_surface_is_told_by_its_curves(figure, axis):
+def test_curves_show_growth_across_the_surface(figure, axis):
     v, f = figure
     fine, faces = cases.figure(5)
     grown = np.where(np.arange(3) == axis, 1.6, 1.0)

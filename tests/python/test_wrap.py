@@ -81,7 +81,7 @@ def test_any_implicit_function_is_a_target(samples):
     assert any("not alike" in note for note in field.report.notes)
 
 
-def test_what_the_target_lacks_is_drawn_in_without_passing_through_itself(figure, samples):
+def test_parts_missing_on_the_target_shrink_without_crossing(figure, samples):
     """The nose and the hump of the shape have no counterpart on a ball."""
     ball = af.MeshSdf(*cases.sphere(0.8, 3))
     field = af.wrap(samples, ball, [], af.WrapOptions(alignment="none", centers=200))
@@ -93,7 +93,7 @@ def test_what_the_target_lacks_is_drawn_in_without_passing_through_itself(figure
     assert np.abs(field.inverse(field(v[:500])) - v[:500]).max() < 1e-6
 
 
-def test_what_an_open_target_lacks_keeps_its_shape(figure, samples):
+def test_parts_missing_on_an_open_target_keep_their_shape(figure, samples):
     v, f = figure
     half = f[(v[f].mean(1)[:, 0] < 0.2)]
     grown = v * [1, 1.1, 1.1]
@@ -243,7 +243,7 @@ def test_landmarks_that_lie_are_named_and_left_out(figure, samples, wrong):
 
 
 @pytest.mark.parametrize("seed", [2, 6, 11, 24])
-def test_a_landmark_that_lies_a_little_is_named_beside_one_that_lies_much(seed):
+def test_a_small_landmark_error_is_named_beside_a_large_one(seed):
     """An eighth of the size off, on the same arm; the other one anywhere."""
     v, f, ends = cases.star()
     target_v, rng = cases.moved(v), np.random.default_rng(seed)
@@ -261,7 +261,7 @@ def test_a_landmark_that_lies_a_little_is_named_beside_one_that_lies_much(seed):
 
 
 @pytest.mark.parametrize(("liar", "told"), [(4, 251), (5, 200), (5, 30)])
-def test_a_landmark_on_a_round_back_is_not_blamed_for_what_another_says(figure, samples, liar, told):
+def test_a_correct_landmark_on_a_round_back_is_not_blamed(figure, samples, liar, told):
     v, f = figure
     target_v, ends = cases.moved(v), ends_of(v)[:8]
     pairs = [(v[end], target_v[told if i == liar else end]) for i, end in enumerate(ends)]
@@ -284,7 +284,7 @@ def test_a_landmark_that_unbends_a_tail_is_followed(curl, target_curl):
 
 # Told to the third next, rounding decides whether seven of the ten are found to agree.
 @pytest.mark.parametrize(("step", "is_tie"), [(5, False), (3, True)])
-def test_landmarks_of_which_most_lie_are_not_followed_without_a_word(figure, samples, step, is_tie):
+def test_mostly_wrong_landmarks_are_reported(figure, samples, step, is_tie):
     v, f = figure
     target_v, ends = cases.moved(v), ends_of(v)
     pairs = [(v[a], target_v[b]) for a, b in zip(ends, ends[step:] + ends[:step], strict=True)]
@@ -318,7 +318,7 @@ def test_suggested_landmarks_are_ends_and_lie_where_they_belong(figure, samples)
 FOUND_IN_NOISE = 0.6
 
 
-def test_a_shape_is_found_in_a_noisy_scan_of_three_quarters_of_it():
+def test_a_shape_is_found_in_a_noisy_partial_scan():
     v, f = cases.figure(5)
     diagonal = np.linalg.norm(np.ptp(v, axis=0))
     kept = f[v[f].mean(1) @ [0.2, 1, -0.5] < 0.35]
@@ -477,7 +477,7 @@ def bent(points, angle):
     return np.stack([c * x - s * y + 0.5, s * x + c * y, z], axis=1)
 
 
-def test_what_moves_is_followed_and_comes_back(played):
+def test_a_moving_scan_is_followed_there_and_back(played):
     v, diagonal, true, found, *_ = played
     for shape, mesh in zip(found, true, strict=True):
         assert np.abs(af.MeshSdf(*mesh)(shape)).mean() < OFF * diagonal
@@ -487,7 +487,7 @@ def test_what_moves_is_followed_and_comes_back(played):
     assert np.linalg.norm(found[4][tip] - found[0][tip] - told) < SLIDING * np.linalg.norm(told)
 
 
-def test_what_is_still_moves_less_than_the_noise(played):
+def test_a_still_scan_moves_less_than_its_noise(played):
     v, diagonal, _, found, *_ = played
     steps = np.linalg.norm(np.diff(found[:, v[:, 0] < 0], axis=0), axis=2) / diagonal
     noise = NOISE * np.sqrt(3)
@@ -534,7 +534,7 @@ def test_a_sequence_goes_on_from_a_frame_in_a_file(played, tmp_path):
         af.WrapSequence(samples, kept, af.WrapOptions(centers=50))
 
 
-def test_what_is_no_first_frame_is_named(played):
+def test_a_bad_first_frame_is_named(played):
     v, *_, (*_, field), samples = played
     target = af.MeshSdf(*cases.figure(2))
     with pytest.raises(af.InvalidInput, match="samples"):

@@ -12,7 +12,7 @@ BACKWARD = "PyTorch's backward pass ends with an exception of its own under Wine
 
 PYTHON = {
     "test_arguments.py::test_objects_without_init_are_refused": LIMITS,
-    "test_arguments.py::test_none_is_no_object": LIMITS,
+    "test_arguments.py::test_none_is_refused_as_an_object": LIMITS,
     "test_arguments.py::test_arrays_that_cannot_be_copied_are_named": LIMITS,
     "test_arguments.py::test_sizes_that_memory_cannot_hold_are_named": LIMITS,
     "test_arguments.py::test_a_sparse_file_asks_for_no_memory": LIMITS,
@@ -29,7 +29,7 @@ PYTHON = {
     "test_outputs.py::test_only_regular_files_are_written[socket]": KINDS,
     "test_outputs.py::test_links_are_followed_and_permissions_stay": LINKS,
     "test_outputs.py::test_two_outputs_need_two_files": LINKS,
-    "test_cli.py::test_a_bar_is_drawn_on_a_terminal_alone": "Windows has no pseudo-terminals for Python",
+    "test_cli.py::test_a_progress_bar_is_drawn_only_on_a_terminal": "Windows has no pseudo-terminals",
     "test_point_cache.py::test_a_folder_that_goes_while_it_is_written_to_is_named": OPEN,
     "test_threads.py::test_no_thread_of_another_s_is_started": PROC,
     "test_threads.py::test_after_a_call_torch_still_uses_its_threads": PROC,
