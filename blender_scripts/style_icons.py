@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws addon/icons/*.png, the icons of styles: python blender_scripts/style_icons.py
+"""Draws addon/icons: the styles, the pin tool and the anchor. python blender_scripts/style_icons.py
 
-Each shows the solid bounded by planes with the preferred normals, intersected with a ball.
+A style is shown as the solid bounded by planes with the preferred normals, intersected with a ball.
 """
 
+import itertools
+import math
+import struct
 from pathlib import Path
 
 import numpy as np
+from PIL import Image, ImageDraw
 
 import arapfields as af
 from arapfields.cli.contact_sheet import png
@@ -66,8 +70,56 @@ def picture(normals):
     return np.round(255 * np.clip(whole, 0, 1)).astype(np.uint8)
 
 
+# The pin has Blender's format for tools, coloured triangles: "VCO", a version, width and height, two zeros,
+# then two bytes for each corner's position (from the lower left), then four for its colour (red, green, blue,
+# alpha).
+PIN = FOLDER / "pin.dat"
+WHITE, GREY, ORANGE = (238, 238, 238, 255), (160, 160, 160, 255), (250, 154, 56, 255)
+
+
+def disc(center, radii, colour, corners=28):
+    """Triangles of an ellipse."""
+    rim = [
+        (center[0] + radii[0] * math.cos(a), center[1] + radii[1] * math.sin(a))
+        for a in (2 * math.pi * i / corners for i in range(corners))
+    ]
+    return [((center, rim[i], rim[(i + 1) % corners]), colour) for i in range(corners)]
+
+
+def pin():
+    """A pin on a bent sheet: [((corner, corner, corner), colour)], coordinates from 0 to 255."""
+    steps = [i / 16 for i in range(17)]
+    sheet = [(20 + 215 * t, 52 + 46 * math.sin(math.pi * t)) for t in steps]
+    found = []
+    for (x0, y0), (x1, y1) in itertools.pairwise(sheet):
+        lower, upper = [(x0, y0 - 15), (x1, y1 - 15)], [(x1, y1), (x0, y0)]
+        found += [((*lower, upper[0]), GREY), ((lower[0], *upper), GREY)]
+    found += [(((118, 170), (137, 170), (127.5, 92)), WHITE)]
+    return found + disc((127.5, 194), (44, 44), ORANGE) + disc((114, 208), (12, 12), WHITE)
+
+
+def anchor(size=64):
+    """White strokes on a transparent background, as in Blender's icons."""
+    image = Image.new("RGBA", (size, size))
+    draw = ImageDraw.Draw(image)
+    draw.ellipse((24, 3, 40, 19), outline=WHITE, width=5)
+    draw.line((32, 18, 32, 58), fill=WHITE, width=6)
+    draw.line((18, 27, 46, 27), fill=WHITE, width=5)
+    draw.arc((8, 10, 56, 60), 10, 170, fill=WHITE, width=6)
+    return image
+
+
+def draw_pin_and_anchor():
+    anchor().save(PIN.with_name("anchor.png"), optimize=True)
+    triangles = pin()
+    places = b"".join(struct.pack("BB", round(x), round(y)) for corners, _ in triangles for x, y in corners)
+    colours = b"".join(struct.pack("BBBB", *colour) * 3 for _, colour in triangles)
+    PIN.write_bytes(b"VCO\0" + struct.pack("BBBB", 255, 255, 0, 0) + places + colours)
+
+
 def main():
     FOLDER.mkdir(exist_ok=True)
+    draw_pin_and_anchor()
     for name in af.style_names():
         path = FOLDER / f"{name.replace(' ', '_')}.png"
         path.write_bytes(png(picture(af.preferred_normals(name))))

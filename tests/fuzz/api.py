@@ -19,7 +19,7 @@ LEFT_OUT = {  # {public callable that is not fuzzed: reason}
     "skin_weights": "seconds a call: tests/python/test_skin.py",
     "skin_correctives": "seconds a call: tests/python/test_skin.py",
     "Corrective.value": "of what skin_correctives returns",
-    "RadialField.arrays": "without arguments: tests/python/test_radial.py",
+    "RadialField.arrays": "without arguments: tests/python/test_fields.py",
     "LiveDeformer.reset": "without arguments; it would undo what other calls have set up",
     "PointCacheReader.close": "without arguments, after a reader that the file of each case gives",
 }

@@ -15,7 +15,7 @@ import zipfile
 import numpy as np
 import pytest
 import trimesh
-from support.files.caches import names
+from support.files.archives import names
 from support.files.full_disk import files_of_at_most
 from support.geometry.bar import LEFT, RIGHT, turned
 from support.geometry.meshes import sphere

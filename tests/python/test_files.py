@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import safetensors.numpy
 from support.files import archives
-from support.files.caches import random_motion, write
+from support.files.archives import random_motion, write_cache
 from support.geometry.cases import bar_handles, bar_samples
 from support.programs.cli import run, write_octahedron
 
@@ -378,7 +378,7 @@ def test_written_fields_are_read_again(folder):
     again = af.DeformationField.load(folder / "ü 场.safetensors")
     assert np.array_equal(again(points), field(points))
     motion = random_motion()
-    with PointCacheReader(write(folder / "é.pc2", motion)) as cache:
+    with PointCacheReader(write_cache(folder / "é.pc2", motion)) as cache:
         assert np.array_equal(cache[1], motion[1])
     with pytest.raises(FileNotFoundError) as error:
         af.DeformationField.load(folder / "不.safetensors")

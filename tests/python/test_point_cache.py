@@ -12,7 +12,7 @@ from collections import namedtuple
 
 import numpy as np
 import pytest
-from support.files.caches import FRAMES, POINTS, names, random_motion, write
+from support.files.archives import FRAMES, POINTS, names, random_motion, write_cache
 from support.files.full_disk import files_of_at_most
 
 import arapfields as af
@@ -31,7 +31,7 @@ def motion():
 
 @pytest.mark.parametrize("suffix", ["pc2", "mdd", "PC2"])
 def test_written_caches_are_read(suffix, motion, tmp_path):
-    path = write(tmp_path / f"x.{suffix}", motion, start=10, step=0.5, fps=25)
+    path = write_cache(tmp_path / f"x.{suffix}", motion, start=10, step=0.5, fps=25)
     assert path.stat().st_size == HEADERS[suffix.lower()] + 12 * POINTS * FRAMES
     with PointCacheReader(path) as cache:
         assert (len(cache), cache.points) == (FRAMES, POINTS)
@@ -48,11 +48,11 @@ def test_written_caches_are_read(suffix, motion, tmp_path):
 
 
 def test_bytes_follow_the_formats(motion, tmp_path):
-    pc2 = write(tmp_path / "x.pc2", motion, start=3, step=2).read_bytes()
+    pc2 = write_cache(tmp_path / "x.pc2", motion, start=3, step=2).read_bytes()
     assert pc2[:12] == b"POINTCACHE2\0"
     assert struct.unpack("<2i2fi", pc2[12:32]) == (1, POINTS, 3.0, 2.0, FRAMES)
     assert pc2[32:] == motion.astype("<f4").tobytes()
-    mdd = write(tmp_path / "x.mdd", motion, start=3, step=2, fps=4).read_bytes()
+    mdd = write_cache(tmp_path / "x.mdd", motion, start=3, step=2, fps=4).read_bytes()
     assert struct.unpack(">2i", mdd[:8]) == (FRAMES, POINTS)
     assert np.array_equal(np.frombuffer(mdd[8:28], ">f4"), [0.75, 1.25, 1.75, 2.25, 2.75])
     assert mdd[28:] == motion.astype(">f4").tobytes()
@@ -81,7 +81,7 @@ def test_other_arrays_are_taken(motion, tmp_path):
     ],
 )
 def test_frames_that_cannot_be_kept(positions, text, motion, tmp_path):
-    before = write(tmp_path / "x.pc2", motion).read_bytes()
+    before = write_cache(tmp_path / "x.pc2", motion).read_bytes()
     with (
         pytest.raises(af.InvalidInput, match=text),
         PointCacheWriter(tmp_path / "x.pc2", POINTS, FRAMES) as cache,
@@ -92,7 +92,7 @@ def test_frames_that_cannot_be_kept(positions, text, motion, tmp_path):
 
 @pytest.mark.parametrize("written", [0, 2, FRAMES + 1])
 def test_a_cache_has_the_frames_that_were_promised(written, motion, tmp_path):
-    before = write(tmp_path / "x.mdd", motion).read_bytes()
+    before = write_cache(tmp_path / "x.mdd", motion).read_bytes()
     with (
         pytest.raises(af.InvalidInput, match=r"x\.mdd: (sample 5: the cache was made|. of 5 samples)"),
         PointCacheWriter(tmp_path / "x.mdd", POINTS, FRAMES) as cache,
@@ -248,7 +248,7 @@ def peak():
     ("suffix", "damage", "text"), [(suffix, *case) for suffix, cases in BAD.items() for case in cases]
 )
 def test_damaged_files_are_named(suffix, damage, text, motion, tmp_path):
-    path = write(tmp_path / f"x.{suffix}", motion)
+    path = write_cache(tmp_path / f"x.{suffix}", motion)
     path.write_bytes(damage(path.read_bytes()))
     before = peak()
     with pytest.raises(af.InvalidInput, match=text) as error:
@@ -258,7 +258,7 @@ def test_damaged_files_are_named(suffix, damage, text, motion, tmp_path):
 
 
 def test_infinite_and_missing_frames_are_named(motion, tmp_path):
-    path = write(tmp_path / "x.pc2", motion)
+    path = write_cache(tmp_path / "x.pc2", motion)
     content = bytearray(path.read_bytes())
     at = 32 + 12 * POINTS * 2 + 12 * 3
     content[at : at + 4] = struct.pack("<f", np.nan)
@@ -281,7 +281,7 @@ def test_foreign_files_are_named(tmp_path):
 
 
 def test_a_disk_too_small_shows_before_the_first_frame(motion, tmp_path, monkeypatch):
-    before = write(tmp_path / "x.pc2", motion).read_bytes()
+    before = write_cache(tmp_path / "x.pc2", motion).read_bytes()
     usage = namedtuple("usage", "free")
     monkeypatch.setattr(point_cache.shutil, "disk_usage", lambda place: usage(451))
     with pytest.raises(OSError, match="takes 452 bytes, 451 are free") as error:
@@ -292,7 +292,7 @@ def test_a_disk_too_small_shows_before_the_first_frame(motion, tmp_path, monkeyp
 
 def test_a_disk_that_fills_meanwhile_is_named(motion, tmp_path):
     """A limit on a file's size stands for the full disk: the system refuses in the middle of a frame."""
-    path = write(tmp_path / "x.pc2", motion)
+    path = write_cache(tmp_path / "x.pc2", motion)
     before = path.read_bytes()
     with (
         pytest.raises(OSError) as error,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads and writes files of fields and signed distances as dicts, independently of the library."""
+"""Files of fields and signed distances as dicts, independently of the library, and small point caches."""
 
 import json
 import struct
@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import arapfields as af
+from arapfields.point_cache import PointCacheWriter
 
 DTYPES = {"F64": np.dtype("<f8"), "F32": np.dtype("<f4")}
 NAMES = {dtype: name for name, dtype in DTYPES.items()}
@@ -99,3 +100,22 @@ def load(path):
     """Loads a file by the class for its name."""
     kind = af.NeuralSdf if Path(path).name.startswith("sdf") else af.DeformationField
     return kind.load(path)
+
+
+POINTS, FRAMES = 7, 5  # of a point cache
+
+
+def random_motion():
+    """(FRAMES, POINTS, 3) random positions."""
+    return np.random.default_rng(0).normal(size=(FRAMES, POINTS, 3)).astype(np.float32)
+
+
+def write_cache(path, motion, **settings):
+    with PointCacheWriter(path, motion.shape[1], len(motion), **settings) as cache:
+        for positions in motion:
+            cache.write(positions)
+    return path
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
