@@ -7,6 +7,7 @@ Writes a .blend for each of SCENES, a folder of meshes, and dinosaur.obj.
 """
 
 import argparse
+import math
 import sys
 from pathlib import Path
 
@@ -17,7 +18,6 @@ import bpy  # noqa: E402
 import creatures  # noqa: E402
 import people  # noqa: E402
 import stage  # noqa: E402
-import walking  # noqa: E402
 from mathutils import Vector  # noqa: E402
 
 MESHES = ("dinosaur", "dog", "lizard", "octopus", "mug", "chapel")
@@ -29,6 +29,16 @@ HANDLES = {  # of animate.blend: center and half extents
 BALL = 0.4  # radius of the obstacle in contact.blend
 APART = 1.7  # distance of scan and dog along x
 LAST = 48  # last frame of the motion, which is a loop
+# A walk in place, as keyframes of three handles: the feet and the hips.
+WALK_HANDLES = {  # center and half extents
+    "Foot.L": ((0.27, -0.02, 0.09), (0.17, 0.20, 0.10)),
+    "Foot.R": ((-0.27, -0.02, 0.09), (0.17, 0.20, 0.10)),
+    "Hips": ((0, 0.12, 0.80), (0.22, 0.24, 0.20)),
+}
+CYCLE, CYCLES = 24, 3  # frames per cycle; secondary motion is periodic after one or two
+WALK_LAST = CYCLE * CYCLES
+KEYS = 12  # per cycle
+STRIDE, LIFT = 0.20, 0.17  # half a step along y, and the height of a raised foot
 
 
 def figure(name, shape, turn):
@@ -126,10 +136,46 @@ def held(item, places):
     return empties
 
 
+def foot_in_walk(phase):
+    """(shift, turn about x in radians) of a foot: half the cycle on the ground, half in the air."""
+    if phase < 0.5:
+        return Vector((0, STRIDE * (4 * phase - 1), 0)), 0.0
+    way = 2 * phase - 1
+    return Vector((0, STRIDE * math.cos(math.pi * way), LIFT * math.sin(math.pi * way))), 0.5 * math.sin(
+        2 * math.pi * way
+    )
+
+
+def hips_in_walk(phase):
+    """(shift, rotation) of the hips: down at each step, yaw and roll once per cycle."""
+    once, twice = 2 * math.pi * phase, 4 * math.pi * phase
+    shift = Vector((0.05 * math.cos(once), 0, 0.045 * math.cos(twice) - 0.02))
+    return shift, (0.05 * math.sin(twice), 0.08 * math.cos(once), 0.22 * math.sin(once))
+
+
+def set_keys_of_walk(empties):
+    """Inserts keyframes of CYCLES cycles from frame 1."""
+    rest = {name: empty.location.copy() for name, empty in empties.items()}
+    for number in range(KEYS * CYCLES + 1):
+        frame, phase = 1 + number * CYCLE / KEYS, number / KEYS
+        for name, empty in empties.items():
+            if name == "Hips":
+                shift, turn = hips_in_walk(phase % 1)
+            else:
+                shift, about = foot_in_walk((phase + (0.5 if name.endswith("R") else 0.0)) % 1)
+                turn = (about, 0, 0)
+            empty.location, empty.rotation_euler = rest[name] + shift, turn
+            empty.keyframe_insert("location", frame=frame)
+            empty.keyframe_insert("rotation_euler", frame=frame)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, WALK_LAST
+    scene.frame_set(1)
+
+
 def walk():
     """A creature that walks in place by animated feet and hips, without handles of neck, head and tail."""
     dinosaur = figure("Dinosaur", "dinosaur", 0)
-    walking.set_keys(held(dinosaur, walking.HANDLES))
+    set_keys_of_walk(held(dinosaur, WALK_HANDLES))
     in_studio(
         [dinosaur],
         azimuth=52,

@@ -30,10 +30,9 @@ sys.path[:0] = [str(HERE)]
 
 import at_hand  # noqa: E402
 from figures import FIGURES  # noqa: E402
-from pictures import SUFFIX, store  # noqa: E402
 
 SHARED = ["stage.py", "shapes.py", "creatures.py", "figures/common.py"]
-OF_PAGES = ["examples.py", "people.py", "walking.py"]  # modules of figures that run a page's script
+OF_PAGES = ["examples.py", "people.py"]  # modules of figures that run a page's script
 LIBRARY = [
     path
     for path in sorted((ROOT / "native").rglob("*"))
@@ -41,6 +40,9 @@ LIBRARY = [
 ]
 
 
+# A tenth of a PNG's size.
+SUFFIX = ".webp"
+STORED = {"format": "WEBP", "quality": 95, "method": 6}
 DRAWN = "drawn.json"  # the pictures and measurements of a figure's process
 ONE_AT_A_TIME = threading.Lock()
 
@@ -71,6 +73,16 @@ def content_hash(figure):
 def pictures(folder):
     """The pictures of a figure: sheets, and loops with a still frame of each."""
     return [path for path in folder.iterdir() if path.suffix in (SUFFIX, ".jpg")]
+
+
+def store(path):
+    """Replaces a PNG by a picture in the documentation's format; returns its path."""
+    from PIL import Image
+
+    target = path.with_suffix(SUFFIX)
+    Image.open(path).convert("RGB").save(target, **STORED)
+    path.unlink()
+    return target
 
 
 def draw(name, folder):

@@ -11,7 +11,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from pictures import STORED
+from gallery import STORED
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[1]

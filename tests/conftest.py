@@ -15,7 +15,10 @@ DATA = Path(os.environ.get("ARAPFIELDS_DATA", ROOT.parent / "shared" / "data"))
 
 # Tests of libtorch, its version and its threads: only for a library built with it.
 TORCH_ALONE = (
-    "tests/packaging/test_libtorch_version.py",
+    "tests/packaging/test_pip.py::test_the_package_records_its_libtorch_version",
+    "tests/packaging/test_pip.py::test_another_version_is_named",
+    "tests/packaging/test_pip.py::test_a_missing_torch_is_named",
+    "tests/packaging/test_pip.py::test_import_ends_with_that_line",
     "tests/python/test_threads.py::test_concurrent_calls_keep_their_thread_counts",
 )
 SLOW_PARTS = 10  # of the slow tests, each some minutes on two processors

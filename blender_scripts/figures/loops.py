@@ -9,9 +9,9 @@ from pathlib import Path
 
 import at_hand
 import bpy
+import examples
 import numpy as np
 import stage
-import walking
 from mathutils import Matrix
 from mathutils.bvhtree import BVHTree
 from people import seen_mesh
@@ -244,7 +244,9 @@ def caption(text):
 def cycle(folder, name, text):
     """A picture for each frame of the last cycle, taken in `folder`."""
     words = caption(text)
-    frames = range(walking.LAST - walking.CYCLE + 1, walking.LAST + 1, STEP * (4 if stage.DRAFT else 1))
+    frames = range(
+        examples.WALK_LAST - examples.CYCLE + 1, examples.WALK_LAST + 1, STEP * (4 if stage.DRAFT else 1)
+    )
     paths = []
     for frame in frames:
         bpy.context.scene.frame_set(frame)

@@ -16,7 +16,7 @@ from arapfields.cli.handles import build_handles, read_handles
 from arapfields.cli.meshes import formats
 
 from . import mutate
-from .splats import GIVEN
+from .calls import SPLATS_GIVEN
 
 POINTS = np.random.default_rng(1).uniform(-1, 1, (5, 3))
 FEW = POINTS[:2]
@@ -104,7 +104,7 @@ class Splats(Target):
 
     def make(self):
         path = self.folder / "splats.ply"
-        af.GaussianSplats(*[rows[:12] for rows in GIVEN]).save(path)
+        af.GaussianSplats(*[rows[:12] for rows in SPLATS_GIVEN]).save(path)
         return {"splats": path}
 
     def use(self, path):

@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 
 from .api import LEFT_OUT, public_callables
-from .calls import calls
+from .calls import calls, splat_calls
 from .odd import make_things
 from .run import refusals, run_target, unreached
-from .splats import splat_calls
 
 COUNTS = {
     "fields": 1400,

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from support import tolerances
 from support.geometry import cases
-from support.geometry.layers import small_layers
+from support.geometry.meshes import small_layers
 from support.oracles.network import Network
 from support.tolerances import (
     AUTOGRAD,
@@ -76,7 +76,7 @@ def numbers_by(level):
     """(instruction set, numbers) of a process that was told to use this one, where it can."""
     code = (
         "import numpy as np, sys; sys.path.insert(0, 'tests')\n"
-        "from arapfields import _native; from support.geometry.layers import small_layers\n"
+        "from arapfields import _native; from support.geometry.meshes import small_layers\n"
         "from arapfields._native import testing\n"
         "w, b = small_layers(width=37)\n"
         "x = np.random.default_rng(0).uniform(-1, 1, (100, 3)); c = np.cos(np.arange(1000))\n"

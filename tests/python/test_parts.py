@@ -2,15 +2,85 @@
 """Shapes of several parts: loose beside one another, or touching at rest."""
 
 import functools
+from collections import Counter
 
 import numpy as np
 import pytest
 from support.files import archives
-from support.geometry import cases, meshes, slit
-from support.geometry.cases import shift
+from support.geometry import cases, meshes
+from support.geometry.cases import box, moved, shift, turn
 from support.geometry.meshes import check_closed, read
 
 import arapfields as af
+
+HINGE = -0.4  # x where the slit ends
+PIVOT = (-0.5, 0.0, 0.0)
+
+
+def slit_bar(gap, columns=40, rows=16, layers=6):
+    """Vertices (n,3), triangles (m,3) and each vertex's jaw: −1 lower, 1 upper, 0 behind the slit.
+
+    The bar fills [-1,1] × [-0.5,0.5] × [-0.5,0.5]. It is the boundary of a block of hexahedra; in the slit
+    the lower and the upper jaw have vertices of their own, also where they lie in one place.
+    """
+    x = np.linspace(-1.0, 1.0, columns + 1)
+    y = np.linspace(-0.5, 0.5, rows + 1)
+    half = np.linspace(0.0, 0.5, layers + 1)
+    numbers, places, jaws = {}, [], []
+
+    def vertex(i, j, k, upper):
+        in_slit = x[i] > HINGE + 1e-9
+        key = (i, j, k, upper if k == 0 and in_slit else None)
+        if key not in numbers:
+            numbers[key] = len(places)
+            away = max(half[abs(k)], 0.5 * gap if in_slit else 0.0)
+            places.append((x[i], y[j], away if upper else -away))
+            jaws.append((1 if upper else -1) if in_slit else 0)
+        return numbers[key]
+
+    faces = []
+    for i in range(columns):
+        for j in range(rows):
+            for k in range(-layers, layers):
+                upper = k >= 0
+                at = np.array(
+                    [vertex(i + a, j + b, k + c, upper) for a in (0, 1) for b in (0, 1) for c in (0, 1)]
+                ).reshape(2, 2, 2)
+                for axis in range(3):
+                    for side in (0, 1):
+                        (p, q), (s, t) = np.take(at, side, axis)
+                        quad = [p, s, t, q] if (side == 1) == (axis != 1) else [p, q, t, s]
+                        faces.append(quad)
+    used = Counter(tuple(sorted(quad)) for quad in faces)
+    outer = np.array([quad for quad in faces if used[tuple(sorted(quad))] == 1])
+    triangles = np.concatenate([outer[:, [0, 1, 2]], outer[:, [0, 2, 3]]])
+    kept, triangles = np.unique(triangles, return_inverse=True)
+    return np.array(places)[kept], triangles.reshape(-1, 3), np.array(jaws)[kept]
+
+
+def jaw_handles(degrees=25.0):
+    """The lower jaw's front is held, the upper one's is turned about the hinge."""
+    low = box((0.4, -0.6, -0.6), (1.1, 0.6, -0.05))
+    high = box((0.4, -0.6, 0.05), (1.1, 0.6, 0.6))
+    return [moved(low), moved(high, opening(degrees))]
+
+
+def opening(degrees=25.0):
+    """4×4: the turn of the upper jaw."""
+    return turn((0, 1, 0), -degrees, PIVOT)
+
+
+def jaw_errors(vertices, jaws, deformed, degrees=25.0):
+    """Largest distances of the jaws' front halves from where their handles put them: lower, upper."""
+    motion = opening(degrees)
+    front = vertices[:, 0] > 0.0
+    low, high = front & (jaws < 0), front & (jaws > 0)
+    want = vertices @ motion[:3, :3].T + motion[:3, 3]
+    return (
+        np.linalg.norm(deformed[low] - vertices[low], axis=1).max(),
+        np.linalg.norm(deformed[high] - want[high], axis=1).max(),
+    )
+
 
 # Parts of a mesh that nothing joins and no handle holds stay beside what they lie next to.
 
@@ -138,15 +208,15 @@ JAW_ERROR = 0.04
 
 @functools.cache
 def solved(gap):
-    vertices, triangles, jaws = slit.slit_bar(gap)
+    vertices, triangles, jaws = slit_bar(gap)
     samples = af.sample_mesh(vertices, triangles, count=8000)
-    field = af.deform(samples, slit.jaw_handles(), options=af.DeformOptions())
+    field = af.deform(samples, jaw_handles(), options=af.DeformOptions())
     return vertices, triangles, jaws, field
 
 
 def test_a_slit_bar_is_closed():
     for gap in GAPS:
-        vertices, triangles, _ = slit.slit_bar(gap)
+        vertices, triangles, _ = slit_bar(gap)
         check_closed(vertices, triangles)
         corners = vertices[triangles]
         volume = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
@@ -157,7 +227,7 @@ def test_a_slit_bar_is_closed():
 def test_the_jaws_of_a_slit_bar_come_apart(gap):
     vertices, triangles, jaws, field = solved(gap)
     deformed = field.apply(vertices, triangles=triangles)
-    assert max(slit.jaw_errors(vertices, jaws, deformed)) < JAW_ERROR
+    assert max(jaw_errors(vertices, jaws, deformed)) < JAW_ERROR
     assert field.report.min_determinant > 0.0
 
 
@@ -231,18 +301,18 @@ def test_visibility_of_nodes_is_checked_on_loading(name, value, message, tmp_pat
 
 def test_a_finer_mesh_is_moved_by_its_own_triangles():
     field = solved(0.004)[3]
-    vertices, triangles, jaws = slit.slit_bar(0.004, columns=70, rows=24, layers=9)
+    vertices, triangles, jaws = slit_bar(0.004, columns=70, rows=24, layers=9)
     deformed = field.apply(vertices, triangles=triangles)
-    assert max(slit.jaw_errors(vertices, jaws, deformed)) < JAW_ERROR
+    assert max(jaw_errors(vertices, jaws, deformed)) < JAW_ERROR
 
 
 def test_live_tracks_vertices_by_their_triangles():
-    vertices, triangles, jaws = slit.slit_bar(0.0)
+    vertices, triangles, jaws = slit_bar(0.0)
     samples = af.sample_mesh(vertices, triangles, count=8000)
-    live = af.LiveDeformer(samples, slit.jaw_handles())
+    live = af.LiveDeformer(samples, jaw_handles())
     live.track(vertices, triangles=triangles)
     live.follow(iterations=100, tolerance=1e-6)
-    assert max(slit.jaw_errors(vertices, jaws, live.tracked())) < JAW_ERROR
+    assert max(jaw_errors(vertices, jaws, live.tracked())) < JAW_ERROR
 
 
 def test_triangles_of_other_vertices_are_refused():

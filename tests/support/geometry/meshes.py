@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes of tests: vertices (n, 3) float64, triangles (m, 3) int64, counter-clockwise from outside."""
+"""Meshes of tests: vertices (n, 3) float64, triangles (m, 3) int64, counter-clockwise from outside.
+
+And small networks without PyTorch, for short processes.
+"""
 
 import functools
 import os
 import subprocess
 import sys
 import tempfile
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -148,3 +152,11 @@ def suzanne():
 def read_arrays(file):
     arrays = np.load(file)
     return arrays["v"].astype(float), arrays["f"].astype(np.int64)
+
+
+def small_layers(seed=0, width=8, layers=2, octaves=4):
+    """(weights, biases) of a small network with random entries."""
+    rng = np.random.default_rng(seed)
+    sizes = [6 * octaves, *[width] * layers, 1]
+    weights = [rng.normal(size=(b, a)) / a**0.5 for a, b in pairwise(sizes)]
+    return weights, [rng.normal(size=b) * 0.1 for b in sizes[1:]]
