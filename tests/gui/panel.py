@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of the panel's sections, one open at a time, and of handles."""
+"""Pictures of the panel's sections, one open at a time, in English and German, and of handles."""
 
 import bpy
 import stage
 
+from addon.preferences import ARAPFIELDS_AP_preferences, show
 from addon.registration import CLASSES
 
 PANEL, ADVANCED = "ARAPFIELDS_PT_", "ARAPFIELDS_PT_advanced"
@@ -23,6 +24,15 @@ def checks(figures, folder):
     stage.picture(folder, "handles")
     yield from sections(folder, "panel")
     figures["languages"] = len(bpy.app.translations.locales)
+    if "de_DE" in bpy.app.translations.locales:
+        view = bpy.context.preferences.view
+        view.language = "de_DE"
+        yield 1.0
+        yield from sections(folder, "german")
+        yield from preferences(folder, "german-preferences")
+        view.language = "en_US"
+        yield 1.0
+    yield from preferences(folder, "preferences")
     yield from open_alone({"source", "handles", "deform", "stylize"})
     bar.modifiers.clear()
     bar.arapfields.surface = "EXACT"
@@ -84,3 +94,31 @@ def open_alone(names):
 def press(row, inner=0):
     stage.tool("mousemove", HEADER[0], round(HEADER[1] + STEP * row + INNER * inner), "click", 1)
     yield 1.0
+
+
+def preferences(folder, name):
+    """A picture of the add-on's preferences, drawn in a popup."""
+
+    class Shown(bpy.types.Operator):
+        bl_idname, bl_label = "wm.arapfields_preferences_shown", "ARAP Fields"
+        __annotations__ = dict(ARAPFIELDS_AP_preferences.__annotations__)
+
+        def draw(self, context):
+            show(self.layout, self.properties)
+
+        def invoke(self, context, event):
+            return context.window_manager.invoke_props_dialog(self, width=500)
+
+        def execute(self, context):
+            return {"FINISHED"}
+
+    bpy.utils.register_class(Shown)
+    stage.tool("mousemove", 500, 400)
+    yield 0.5
+    with stage.override():
+        bpy.ops.wm.arapfields_preferences_shown("INVOKE_DEFAULT")
+    yield 1.0
+    stage.picture(folder, name)
+    stage.tool("key", "Escape")
+    yield 0.7
+    bpy.utils.unregister_class(Shown)

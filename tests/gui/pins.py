@@ -14,7 +14,7 @@ from support.blender import scenes
 from addon.live import sessions
 
 END = (0.9, -0.25, 0.0)  # on the bar's front
-ROUNDS, STRIDE = 100, 5  # of undo and redo; states between prints
+ROUNDS = 100  # of undo and redo
 KINDS = ("objects", "meshes", "node_groups", "scenes", "collections")
 
 
@@ -182,8 +182,6 @@ def undo_checks(figures, folder):
 
 def record(figures, name, exact):
     figures[f"undo_{name}"] = {"exact": sum(exact), "of": len(exact)}
-    if len(exact) % STRIDE == 0:
-        print(name, figures[f"undo_{name}"], flush=True)
 
 
 def rested(figures, before, after):
