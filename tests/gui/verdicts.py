@@ -109,7 +109,6 @@ EXPECTED = {  # {part: {result: rule}}, complete
         "wrap_taken_back": is_(0),
         "wrap_landmarks_off_by": below(0.15).each(10),
         "wrap_escape": TRUE,
-        "wrap_press_s": FIGURE,
         "wrap_moves": above(0.05).each(2),
         **all_of(TRUE, "wrap_undone", "wrap_undone_bones", "wrap_redone", "wrap_redone_bones"),
         "wrap_stack": Rule("a field and an armature", lambda figures: {"NODES", "ARMATURE"} <= {*figures}),

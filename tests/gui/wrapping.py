@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Wrap by mouse: target, landmarks, Wrap, Esc, undo and redo."""
 
-import time
 import types
 
 import bpy
@@ -102,11 +101,9 @@ def press(figures, folder):
     yield from until_idle(20.0)
     yield 0.5
     figures["wrap_escape"] = was_running and np.array_equal(shape(), rest) and not fielded(body)
-    begin = time.perf_counter()
     yield from click(WRAP, pause=1.0)
     stage.picture(folder, "wrap-running")
     yield from until_idle(400.0)
-    figures["wrap_press_s"] = round(time.perf_counter() - begin, 1)
     yield 1.0
     stage.tool("mousemove", 500, 850)
     yield 0.6
