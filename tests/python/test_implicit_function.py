@@ -251,7 +251,7 @@ def test_results_that_do_not_fit_are_named(returned, word):
 
 @pytest.mark.parametrize("bound", [1.0, np.float32(2.0), None])
 def test_a_bound_on_the_gradient_is_taken(bound):
-    class Bounded(Ball):
+    class Bounded(PlainBall):
         gradient_bound = bound
 
     assert np.array_equal(
@@ -261,7 +261,7 @@ def test_a_bound_on_the_gradient_is_taken(bound):
 
 @pytest.mark.parametrize("bound", [0.0, -1.0, np.nan, "steep", [1.0, 2.0]])
 def test_a_bad_gradient_bound_is_named(bound):
-    class Bounded(Ball):
+    class Bounded(PlainBall):
         gradient_bound = bound
 
     with pytest.raises(af.InvalidInput, match=r"^sdf\.gradient_bound"):
@@ -269,7 +269,7 @@ def test_a_bad_gradient_bound_is_named(bound):
 
 
 def test_gradients_that_do_not_fit_are_named():
-    class Odd(Ball):
+    class Odd(PlainBall):
         def gradient(self, points):
             return points[:5]
 
