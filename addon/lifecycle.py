@@ -7,7 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import commands, first_run, install_check, menus
-from .blender import icons, library_loading, modifier_stack, timers, translations
+from .blender import former_defaults, icons, library_loading, modifier_stack, timers, translations
 from .blender.host import has_window
 from .blender.language import translated
 from .carried import carrying
@@ -58,6 +58,7 @@ def before_save(*_):
 
 @persistent
 def after_load(*_):
+    former_defaults.keep()
     hover.clear()
     first_result.steps.recover()
     recovery.after_load()
