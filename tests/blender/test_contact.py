@@ -15,7 +15,7 @@ if IN_BLENDER:
     from support.blender.stacks import local_points
 
     from addon.core.runtime import jobs
-    from addon.live import touching
+    from addon.live import sessions, touching
     from addon.pin_tool.tool import ARAPFIELDS_TOOL_pin
     from addon.solver import contact
 
@@ -52,6 +52,29 @@ def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
     bpy.ops.arapfields.deform(samples=1000)
     crosses = "Bar: Cube crosses the surface; what lies inside of it stays there"
     assert crosses in [text for _, text in jobs.messages()]
+
+
+@pytest.mark.parametrize("rests", [False, True])
+def test_a_cancelled_move_of_an_obstacle_ends_in_the_shape_before(rests):
+    """Esc puts what was moved back: the shape before it is there at once, bit for bit, however long the move
+    has rested elsewhere."""
+    bar, block, _ = pressed()
+    scenes.activate(block, bar)
+    bpy.ops.arapfields.add_obstacle()
+    bar.arapfields.contact.use = True
+    assert bpy.ops.arapfields.live(kind="DEFORM") == {"FINISHED"}
+    lowest(bar)
+    before, height = local_points(bar), block.location.z
+    for lift in (0.1, 0.3):
+        block.location.z = height + lift
+        step(refined=rests)
+    assert np.abs(local_points(bar) - before).max() > 0.05
+    block.location.z = height
+    bpy.context.view_layer.update()
+    sessions.update(bpy.context)  # without waiting
+    assert np.array_equal(local_points(bar), before)
+    step(refined=True)
+    assert np.array_equal(local_points(bar), before)
 
 
 def test_what_cannot_be_an_obstacle_is_said():
