@@ -14,7 +14,7 @@ from .carried import carrying
 from .core.runtime import jobs, threads
 from .deform import first_result
 from .field_modifier import copies, motion
-from .handles import held_counts, left_behind, row_selection
+from .handles import applied_transforms, held_counts, left_behind, row_selection
 from .jobs import modal
 from .jobs.display import display
 from .live import recovery, rendering, sessions, stored, touching
@@ -35,6 +35,7 @@ def before_load(*_):
     passing = (jobs.board, held_counts.pending, staleness.changed, row_selection.seen, prefetch)
     for state in (*passing, applying.solved, first_result.steps, left_behind.seen, stored.shapes):
         state.clear()
+    applied_transforms.clear()
     carrying.written.clear()
     sessions.stop_all()
     jobs.forget_messages()
@@ -68,6 +69,7 @@ def after_restore(*_):
     """A step was undone or redone."""
     hover.clear()
     first_result.steps.recover()
+    applied_transforms.after_undo()
     recovery.after_undo()
 
 
@@ -75,6 +77,8 @@ def after_restore(*_):
 def after_update(scene, depsgraph):
     if not modifier_stack.is_stage(scene):
         staleness.watch(depsgraph)
+        if not sessions.live.is_rendering:
+            applied_transforms.follow(depsgraph)
         sessions.watch(depsgraph)
         motion.written.clear()
         if not sessions.live.is_rendering:
@@ -145,7 +149,15 @@ STATE += (
     previews.shown,
     first_result.steps,
 )
-STATE += (row_selection.seen, timers, style_object.cache, left_behind.seen, stored.shapes)
+STATE += (
+    row_selection.seen,
+    timers,
+    style_object.cache,
+    left_behind.seen,
+    stored.shapes,
+    applied_transforms,
+    pin_hints.status,
+)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread
 

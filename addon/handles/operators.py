@@ -200,7 +200,7 @@ class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
             is_own = empty is not None and settings_of(empty).handle_of == source
             empties.remove(source, index)
             if self.delete and is_own:
-                bpy.data.objects.remove(empty)
+                empties.delete(empty)
         return translated("Handles removed: {count}", count=len(rows))
 
 

@@ -109,6 +109,8 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
             draw_settings(layout, entry, "weight", "reach")
             if entry.kind in empties.PINS:
                 draw_settings(layout, entry, "hold_turn")
+            if entry.kind != "BONE":
+                draw_settings(layout, entry, "in_world")
             if entry.kind != "POINT":
                 draw_settings(layout, entry, "allow_scale")
             if entry.kind in ("GROUP", "BONE"):

@@ -5,6 +5,7 @@ import numpy as np
 from ..blender.object_references import owner_of
 from ..blender.property_definitions import flag, number
 from ..blender.redraw import redraw
+from ..blender.selection import select_alone
 from ..core.errors import UserError
 from ..live import sessions
 from ..live.prefetch import prefetch
@@ -73,7 +74,7 @@ class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
                 return self.start(context, view, drag_of_new_pin(context, source, target, kind=kind), "MOVE")
             entry = pins.entry_of(target.empty.get())
             if entry.anchor:
-                return {"FINISHED"} if pins.select(context, entry.empty) else {"CANCELLED"}
+                return {"FINISHED"} if pins.choose(context, entry.empty) else {"CANCELLED"}
             dragged = drag.of_entry(context, source, entry)
             return self.start(context, view, dragged, "TURN" if target.kind == "RING" else "MOVE")
         except (UserError, ValueError) as error:
@@ -96,7 +97,7 @@ class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
                 drag_of_new_pin(context, source, target, anchor=True).end(context)
             else:
                 entry = pins.entry_of(target.empty.get())
-                pins.select(context, entry.empty)
+                pins.choose(context, entry.empty)
                 entry.anchor = not entry.anchor
                 drag.of_entry(context, source, entry).end(context)
         except (UserError, ValueError) as error:
@@ -174,6 +175,7 @@ class ARAPFIELDS_OT_pin_turn(PinOperator, bpy.types.Operator):
             return self.refuse(error)
         sessions.live[source.session_uid].keeps_shape = True
         pins.entry_of(empty).hold_turn = True
+        select_alone(context, empty)
         return bpy.ops.transform.rotate("INVOKE_DEFAULT") and {"FINISHED"}
 
 

@@ -113,7 +113,7 @@ class SourceReader:
         settings, space, targets = settings_of(seen), space_of(where(source), source.name), []
         space = space.as_at(self.surface.space)
         if self.handles:
-            current = empties.solve_handles(source, space, where=where)
+            current = empties.solve_handles(source, space, where=where, rendered=rendered)
             if len(current) != len(self.handles):
                 raise SourceChanged(source.name)
             targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
