@@ -4,7 +4,7 @@ import bpy
 from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
 from ..core.geometry.handles import nothing_held
 from ..core.settings.parameters import DEFORM
-from ..handles import empties
+from ..handles import empties, symmetry
 from ..live.panel import live_buttons, playback_progress
 from ..names import Op
 from ..results.placement import placement_refusal, replaced_by
@@ -23,6 +23,7 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
         job_button(layout, Op.DEFORM, "MOD_SIMPLEDEFORM")
         settings_column(layout, settings.deform, DEFORM, advanced=False)
         playback_progress(layout, source, "DEFORM")
+        note(layout, symmetry.beside(source))
         note(
             layout, empties.require_handles(source), placement_refusal(source), replaced_by(source, "DEFORM")
         )
