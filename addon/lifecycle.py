@@ -14,12 +14,13 @@ from .carried import carrying
 from .core.runtime import jobs, threads
 from .deform import first_result
 from .field_modifier import copies, motion
-from .handles import applied_transforms, held_counts, left_behind, row_selection
+from .handles import applied_transforms, held_counts, left_behind, row_selection, symmetry
 from .jobs import modal
 from .jobs.display import display
 from .live import recovery, rendering, sessions, stored, touching
 from .live.prefetch import prefetch
 from .pin_tool import drawing as pin_drawing
+from .pin_tool import hints as pin_hints
 from .pin_tool import tool
 from .pin_tool.hover import hover
 from .poses import applying
@@ -126,6 +127,7 @@ HANDLERS = {  # of bpy.app.handlers
 DRAWINGS = (  # over every 3D viewport
     *((previews.draw, "POST_VIEW"), (handle_boxes.draw, "POST_VIEW"), (pin_drawing.draw, "POST_VIEW")),
     *((touching.draw, "POST_VIEW"), (landmark_drawing.draw, "POST_PIXEL")),
+    (pin_drawing.draw_label, "POST_PIXEL"),
 )
 PARTS = (  # what begins with the extension, and how it ends
     (icons.load, icons.clear),
@@ -157,6 +159,7 @@ STATE += (
     stored.shapes,
     applied_transforms,
     pin_hints.status,
+    symmetry.planes,
 )
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread

@@ -10,7 +10,7 @@ from ..core.errors import UserError
 from ..live import sessions
 from ..live.prefetch import prefetch
 from ..names import TOOL
-from . import drag, pins
+from . import drag, hints, pins
 from .hover import View, hover, under
 from .modal import Dragging, PinOperator
 
@@ -48,7 +48,12 @@ class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
 
     def invoke(self, context, event):
         if context.region_data is not None and hover.drag is None:
-            before, hover.target = hover.target, under(context, View(context, event), lights=True)
+            view = View(context, event)
+            before = hover.target or hover.missed
+            hover.target, hover.missed = under(context, view, lights=True, other=event.alt), None
+            hover.pixel, hover.region = view.pixel, context.region.as_pointer()
+            hover.label = "" if hover.target is None else hints.label(hover.target)
+            hints.refresh()
             if before is not None or hover.target is not None:
                 context.region.tag_redraw()
             source = hover.target.source.find() if hover.target is not None else None
@@ -62,11 +67,16 @@ class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
 
     bl_label = "ARAP Pin: Drag"
 
+    other: flag("Any Object", "Pin the object under the cursor, active or not", options={"SKIP_SAVE"})
+
     def invoke(self, context, event):
         view = View(context, event)
-        target = under(context, view)
+        target = under(context, view, other=self.other)
         if target is None:
-            return {"PASS_THROUGH"}
+            return self.miss(context, view)
+        if target.kind == "OTHER":
+            self.report({"INFO"}, hints.label(target))
+            return {"CANCELLED"}
         try:
             source = source_of_target(target)
             if target.kind == "SURFACE":
@@ -80,6 +90,12 @@ class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
         except (UserError, ValueError) as error:
             return self.refuse(error)
 
+    def miss(self, context, view):
+        """Shows that a press has met nothing."""
+        hover.missed, hover.pixel, hover.region = view.pixel, view.pixel, context.region.as_pointer()
+        context.region.tag_redraw()
+        return {"PASS_THROUGH"}
+
 
 class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
     """Place an anchor on the surface under the cursor, or make the pin there an anchor or a pin again"""
@@ -91,6 +107,9 @@ class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
         target = under(context, View(context, event))
         if target is None:
             return {"PASS_THROUGH"}
+        if target.kind == "OTHER":
+            self.report({"INFO"}, hints.label(target))
+            return {"CANCELLED"}
         try:
             source = source_of_target(target)
             if target.kind == "SURFACE":
