@@ -127,7 +127,7 @@ HANDLERS = {  # of bpy.app.handlers
 DRAWINGS = (  # over every 3D viewport
     *((previews.draw, "POST_VIEW"), (handle_boxes.draw, "POST_VIEW"), (pin_drawing.draw, "POST_VIEW")),
     *((touching.draw, "POST_VIEW"), (landmark_drawing.draw, "POST_PIXEL")),
-    (pin_drawing.draw_label, "POST_PIXEL"),
+    *((pin_drawing.draw_label, "POST_PIXEL"), (first_run.draw, "POST_PIXEL")),
 )
 PARTS = (  # what begins with the extension, and how it ends
     (icons.load, icons.clear),
@@ -160,6 +160,7 @@ STATE += (
     applied_transforms,
     pin_hints.status,
     symmetry.planes,
+    first_run.welcome,
 )
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread

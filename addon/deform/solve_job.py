@@ -180,10 +180,9 @@ def describe(shown, report, size):
         near = max(report["to_target_mean"], report["from_target_mean"])
         figures.append(translated("{share} of the target's size off on average", share=f"{near:.2%}"))
     if report.get("flipped_share"):
-        share, worst = f"{report['flipped_share']:.1%}", f"{report['min_determinant']:.2g}"
-        figures.append(translated("{share} folded (det J down to {worst})", share=share, worst=worst))
+        figures.append(translated("{share} of it is folded over", share=f"{report['flipped_share']:.1%}"))
     elif "flipped_share" in report:
-        figures.append(translated("nothing folded"))
+        figures.append(translated("no folds"))
     if report.get("far_target"):
         sizes = f"{report['far_target']:.0f}"
         figures.append(translated("a target is {sizes} times the object's size away", sizes=sizes))

@@ -30,8 +30,9 @@ def label(target):
         return ""
     if target.kind == "RING":
         return translated("Turn {name}", name=empty.name)
-    text = "Choose {name}, an anchor" if entry.anchor else "Drag {name}"
-    return translated(text, name=empty.name)
+    if entry.anchor:
+        return translated("Choose {name}, an anchor", name=empty.name)
+    return translated("Drag {name}", name=empty.name)
 
 
 def keys(target, drag):

@@ -37,7 +37,7 @@ EXPECTED = {
     "nothing": ("ARAPFIELDS_PT_source", "Select a mesh object"),
     "a camera": ("ARAPFIELDS_PT_source", "Select a mesh object"),
     "a mesh": ("ARAPFIELDS_PT_surface", "Not fitted yet"),
-    "modifiers and keys": ("ARAPFIELDS_PT_status", "Read before S"),
+    "modifiers and keys": ("ARAPFIELDS_PT_status", "Works before S"),
     "edit mode": ("ARAPFIELDS_PT_source", "Bar is in Edit Mode; leave it first"),
     "a handle active": ("ARAPFIELDS_PT_source", "Bar"),
     "a deleted handle": ("ARAPFIELDS_PT_handles", "(deleted)"),
