@@ -123,4 +123,3 @@ def apply(source, change):
         if moved.offsets is not None:
             turns = None if moved.turns is None else moved.turns @ turn.T
             motion.write_to(mesh, motion.Motion(moved.offsets @ change[:3, :3].T, turns), number)
-            motion.written.add(source.session_uid)

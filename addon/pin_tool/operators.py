@@ -29,6 +29,18 @@ def drag_of_new_pin(context, source, target, **further):
     return drag.of_new_pin(context, source, target.location, target.radius, **where, **further)
 
 
+def view_at_press(context, event):
+    """The View of a press, with the pixel where the button went down.
+
+    Where Blender is late, as after a long update, the event has the cursor's later place.
+    """
+    view = View(context, event)
+    last = event.mouse_prev_x - context.region.x, event.mouse_prev_y - context.region.y
+    if hover.region == context.region.as_pointer() and hover.pixel == last:
+        view.pixel = last
+    return view
+
+
 class ARAPFIELDS_OT_pin_tool(PinOperator, bpy.types.Operator):
     """Take the tool that pins the surface and drags it, in the toolbar"""
 
@@ -70,7 +82,7 @@ class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
     other: flag("Any Object", "Pin the object under the cursor, active or not", options={"SKIP_SAVE"})
 
     def invoke(self, context, event):
-        view = View(context, event)
+        view = view_at_press(context, event)
         target = under(context, view, other=self.other)
         if target is None:
             return self.miss(context, view)
@@ -104,7 +116,7 @@ class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
     bl_options = {"UNDO"}
 
     def invoke(self, context, event):
-        target = under(context, View(context, event))
+        target = under(context, view_at_press(context, event))
         if target is None:
             return {"PASS_THROUGH"}
         if target.kind == "OTHER":
@@ -162,7 +174,7 @@ class ARAPFIELDS_OT_pin_delete(PinOperator, bpy.types.Operator):
     def invoke(self, context, event):
         if not self.under:
             return self.execute(context)
-        target = under(context, View(context, event))
+        target = under(context, view_at_press(context, event))
         empty = target.empty.find() if target is not None and target.kind == "HANDLE" else None
         return self.delete(context, empty)
 
