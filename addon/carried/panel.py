@@ -39,6 +39,7 @@ class ARAPFIELDS_UL_carried(bpy.types.UIList):
 class ARAPFIELDS_PT_carried(Section, bpy.types.Panel):
     bl_label = "Carried Objects"
     bl_order = 6
+    tasks = frozenset({"POSE", "STYLE", "WRAP"})
     bl_options = {"DEFAULT_CLOSED"}
 
     def fill(self, context, source, settings):

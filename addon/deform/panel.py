@@ -13,6 +13,7 @@ from ..results.placement import placement_refusal, replaced_by
 class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
     bl_label = "Deform"
     bl_order = 2
+    tasks = frozenset({"POSE"})
 
     def draw_header_preset(self, context):
         presets(self.layout, "deform")
@@ -34,6 +35,7 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
 class ARAPFIELDS_PT_deform_settings(Advanced, bpy.types.Panel):
     bl_label = "Deform Settings"
     bl_order = 1
+    tasks = frozenset({"POSE"})
 
     def fill(self, context, source, settings):
         settings_column(self.layout, settings.deform, DEFORM, advanced=True)

@@ -85,6 +85,7 @@ class ARAPFIELDS_MT_more_handle(bpy.types.Menu):
 class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
     bl_label = "Handles"
     bl_order = 1
+    tasks = frozenset({"POSE"})
 
     def fill(self, context, source, settings):
         layout = self.layout

@@ -19,8 +19,8 @@ from addon.live import sessions
 F3, MINUS = "69", "20"  # key codes: by name the X server may press Alt as well
 MIDDLE = (560, 520)  # of the 3D view
 # Positions in the sidebar with one open section: the list's + and its rows, Deform and Stylize.
-PLUS, FROM_EMPTIES, SECOND_ROW = (1261, 159), (1340, 180), (1130, 181)
-DEFORM, STYLIZE = (1140, 223), (1140, 343)
+PLUS, FROM_EMPTIES, SECOND_ROW = (1261, 234), (1340, 255), (1130, 256)
+DEFORM, STYLIZE = (1140, 298), (1140, 361)
 FIT, FIT_SURFACE = (1252, 25), (1130, 80)  # below the header of Implicit Surface in Advanced
 
 
