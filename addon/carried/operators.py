@@ -56,11 +56,11 @@ class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
 
 
 def candidates(context, source):
-    """The selected objects to carry: no handles, and no cameras and lights beside other objects, as after
-    Select All."""
+    """The selected objects to carry: no handles, and beside other objects no cameras and lights that hang on
+    nothing, as after Select All."""
     others = [one for one in context.selected_objects if one != source]
     found = [one for one in others if one.type != "EMPTY" or owner_of(one) is None]
-    return [one for one in found if one.type not in STUDIO] or found
+    return [one for one in found if one.type not in STUDIO or one.parent is not None] or found
 
 
 def carry(source, item, way):
