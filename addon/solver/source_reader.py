@@ -15,7 +15,7 @@ from ..carried.carrying import Carrying, Reshaped
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of, unflattened
 from ..core.runtime import native
-from ..handles import empties, movers
+from ..handles import empties, movers, symmetry
 from ..handles.properties import UNKNOWN_FRAME
 from ..surface.source_surface import read_surface
 from . import secondary_motion, style_settings
@@ -45,7 +45,7 @@ class SourceReader:
         context.view_layer.update()
         self.reference, self.kind = ObjectReference(source), kind
         self.carrying = Carrying(context, source)
-        space = space_of(place_of(source), source.name)
+        space = solve_space(source, place_of(source), kind)
         self.surface, is_at_hand = read_at_rest(
             context, source, kind, in_place, carrying=self.carrying, space=space
         )
@@ -113,7 +113,7 @@ class SourceReader:
         settings, space, targets = settings_of(seen), space_of(where(source), source.name), []
         space = space.as_at(self.surface.space)
         if self.handles:
-            current = empties.solve_handles(source, space, where=where)
+            current = empties.solve_handles(source, space, where=where, rendered=rendered)
             if len(current) != len(self.handles):
                 raise SourceChanged(source.name)
             targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
@@ -128,6 +128,11 @@ class SourceReader:
             secondary_motion.motion_of(settings, space),
             contact_of(source, settings, space, rendered or depsgraph_of(context)),
         )
+
+
+def solve_space(source, world, kind):
+    """The solve space of a source with that world matrix; a style ignores symmetry."""
+    return symmetry.space_for(source, world) if kind == "DEFORM" else space_of(world, source.name)
 
 
 def place_of(item, bone="", rendered=None):

@@ -56,7 +56,7 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         handles = empties.solve_handles(source, space, of_groups) if settings.use_handles else []
         weights = style_settings.region_weights(context, source, settings, of_groups, self.in_place(source))
 
-        contact = for_job(context, source, is_fast(values, STYLIZE))
+        contact = for_job(context, source, is_fast(values, STYLIZE), space)
 
         def solve(tracker, rest, samples, weight):
             blend = (
