@@ -60,7 +60,7 @@ Solution stylize(const SurfaceSamples& samples, const Style& style, const Styliz
   terms.barrier_threshold = options.surface.barrier_threshold;
   terms.style = StyleAtSamples::of(style, samples.normals, options.sharpness);
   if (!terms.style.idle(samples.normals))
-    terms.gauss = options.strength * options.gauss_weight * terms.style.factor;
+    terms.gauss = terms.style.share(options.strength) * options.gauss_weight * terms.style.factor;
   if (weights.size() > 0) terms.style.weights = terms.style.weights.cwiseProduct(weights);
   terms.external = hooks.energies;
   terms.further = hooks.terms;
