@@ -12,7 +12,7 @@ import arapfields as af
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender_scripts"))
 import menagerie
 
-EVEN = 0.1  # of the share; for a cube
+EVEN = 0.15  # of the share; for a cube
 
 
 @pytest.mark.parametrize("name", ["dog", "dinosaur"])
