@@ -36,7 +36,7 @@ def plan_solve_job(
 ):
     """The job's item. `solve(tracker, surface, samples, weight)` returns the field, on the worker.
 
-    `finish`: stylize.finish.Finish, which gives vertices that the field has moved their final places.
+    `finish(tracker, surface, points, triangles, moved)` gives vertices that the field has moved their places.
     `space`: the solve space, by default that of the object's present matrix.
     `places`: the object's transform takes the similarity part of the result, the mesh the rest.
     """
@@ -70,7 +70,7 @@ def plan_solve_job(
         own = field(surface.vertices, triangles=surface.faces) if needs_own else None
         if own is not None:
             if finish is not None and surface.faces is not None:
-                own = finish.finished(tracker, surface, surface.vertices, surface.faces, own, 1.0)
+                own = finish(tracker, surface, surface.vertices, surface.faces, own)
             own = placed.moved(own, field)
         if output == "REMESH":
             after, topology, figures = surface.extract_moved(tracker, field, **extraction)
@@ -79,7 +79,7 @@ def plan_solve_job(
             extracted, topology = surface.extract(tracker, 0.1, **extraction)
             after = field(extracted)
             if finish is not None:
-                after = finish.finished(tracker, surface, extracted, topology.corners, after, 1.0)
+                after = finish(tracker, surface, extracted, topology.corners, after)
         else:
             after = own
         if not np.isfinite(after).all():

@@ -122,7 +122,7 @@ def layout_of(source, kind, scene):
     further = (settings.output, settings.result, settings.surface)
     further += (stiffness.group, stiffness.times, stiffness.bend_group, stiffness.bend_times)
     if kind == "STYLIZE":
-        further += (style.region, style.region_material, style.use_handles)
+        further += (style.region, style.region_material, style.use_handles, style.samples, style.seed)
     further += tuple((e.item.session_uid if e.item else 0, e.way) for e in settings.carried)
     further += (secondary_motion.layout_of(source, scene), helper.of(source) is not None)
     further += (rest_frame(source, kind, settings.in_place),)

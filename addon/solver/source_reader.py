@@ -63,7 +63,7 @@ class SourceReader:
             held = style_settings.group_names(source, settings_of(source).stylize)
         else:
             held = empties.group_names(source)
-        soft, region = secondary_motion.group_names(source), None
+        soft, region, further = secondary_motion.group_names(source), None, {}
         weights = yield from vertex_groups.read_weights(context, source, [*held, *soft], in_place)
         source = self.reference.get()
         settings = settings_of(source)
@@ -71,6 +71,7 @@ class SourceReader:
             self.read_handles(source, weights)
         if self.kind == "STYLIZE":
             region = style_settings.region_weights(context, source, settings.stylize, weights, in_place)
+            further = {"samples": settings.stylize.samples, "seed": settings.stylize.seed}  # as the operator
         self.setup = SolverSetup(
             kind=self.kind,
             surface=self.surface,
@@ -82,6 +83,7 @@ class SourceReader:
             masses=weights[soft[0]] if soft else None,
             start=settings.secondary.start,
             fps=secondary_motion.frame_rate(context.scene),
+            **further,
         )
 
     def read_handles(self, source, weights=None):
