@@ -1,10 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Says once, when the extension is first enabled, where it is to be found."""
+"""Says once, when the extension is first enabled, where it is to be found.
 
+The text is in the 3D views for a while, where it takes no key and hides behind no window.
+"""
+
+import time
+
+import blf
 import bpy
 
 from .blender import host, timers
+from .blender.language import translated
+from .blender.redraw import redraw
 from .blender.user_preferences import preferences
+
+SECONDS = 40.0
+SIZE, LEFT, BOTTOM = 14, 90, 40  # of the text and its place in a 3D view, in pixels at UI scale 1
+
+
+class Welcome:
+    """`until`: when the texts go, in seconds of time.monotonic()."""
+
+    until = 0.0
+
+    def clear(self):
+        self.until = 0.0
+
+
+welcome = Welcome()
 
 
 def show():
@@ -12,12 +35,37 @@ def show():
     if stored is None or stored.was_welcomed:
         return
     stored.was_welcomed = bpy.context.preferences.is_dirty = True  # else Blender would not save it
+    welcome.until = time.monotonic() + SECONDS
+    redraw(bpy.context, "WINDOW")
+    timers.start(end, first=SECONDS + 0.1)
 
-    def draw(menu, _):
-        menu.layout.label(text="Over the 3D view press N and choose the tab ARAP Fields")
-        menu.layout.label(text="The same is in the menu Object › ARAP Fields, and F3 finds it")
 
-    bpy.context.window_manager.popup_menu(draw, title="ARAP Fields", icon="INFO")
+def end():
+    """Timer callback."""
+    redraw(bpy.context, "WINDOW")
+
+
+def lines():
+    """The texts that are shown now."""
+    if time.monotonic() >= welcome.until:
+        return []
+    return [
+        translated("ARAP Fields: take the pin tool, at the end of the toolbar, and drag a mesh"),
+        translated("All else is in the sidebar: press N and choose the tab ARAP Fields"),
+        translated("The same is in the menu Object › ARAP Fields, and F3 finds it"),
+    ]
+
+
+def draw():
+    scale = bpy.context.preferences.system.ui_scale
+    blf.size(0, SIZE * scale)
+    blf.enable(0, blf.SHADOW)
+    blf.shadow(0, 5, 0.0, 0.0, 0.0, 0.9)
+    blf.color(0, 1.0, 1.0, 1.0, 1.0)
+    for row, text in enumerate(reversed(lines())):
+        blf.position(0, LEFT * scale, (BOTTOM + 1.6 * SIZE * row) * scale, 0)
+        blf.draw(0, text)
+    blf.disable(0, blf.SHADOW)
 
 
 def start():

@@ -7,19 +7,20 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import commands, first_run, install_check, menus
-from .blender import icons, library_loading, modifier_stack, timers, translations
+from .blender import former_defaults, icons, library_loading, modifier_stack, timers, translations
 from .blender.host import has_window
 from .blender.language import translated
 from .carried import carrying
 from .core.runtime import jobs, threads
 from .deform import first_result
 from .field_modifier import copies, motion
-from .handles import held_counts, left_behind, row_selection
+from .handles import applied_transforms, held_counts, left_behind, row_selection, symmetry
 from .jobs import modal
 from .jobs.display import display
 from .live import recovery, rendering, sessions, stored, touching
 from .live.prefetch import prefetch
 from .pin_tool import drawing as pin_drawing
+from .pin_tool import hints as pin_hints
 from .pin_tool import tool
 from .pin_tool.hover import hover
 from .poses import applying
@@ -35,6 +36,7 @@ def before_load(*_):
     passing = (jobs.board, held_counts.pending, staleness.changed, row_selection.seen, prefetch)
     for state in (*passing, applying.solved, first_result.steps, left_behind.seen, stored.shapes):
         state.clear()
+    applied_transforms.clear()
     carrying.written.clear()
     sessions.stop_all()
     jobs.forget_messages()
@@ -58,6 +60,7 @@ def before_save(*_):
 
 @persistent
 def after_load(*_):
+    former_defaults.keep()
     hover.clear()
     first_result.steps.recover()
     recovery.after_load()
@@ -68,6 +71,7 @@ def after_restore(*_):
     """A step was undone or redone."""
     hover.clear()
     first_result.steps.recover()
+    applied_transforms.after_undo()
     recovery.after_undo()
 
 
@@ -75,6 +79,8 @@ def after_restore(*_):
 def after_update(scene, depsgraph):
     if not modifier_stack.is_stage(scene):
         staleness.watch(depsgraph)
+        if not sessions.live.is_rendering:
+            applied_transforms.follow(depsgraph)
         sessions.watch(depsgraph)
         motion.written.clear()
         if not sessions.live.is_rendering:
@@ -122,6 +128,7 @@ HANDLERS = {  # of bpy.app.handlers
 DRAWINGS = (  # over every 3D viewport
     *((previews.draw, "POST_VIEW"), (handle_boxes.draw, "POST_VIEW"), (pin_drawing.draw, "POST_VIEW")),
     *((touching.draw, "POST_VIEW"), (landmark_drawing.draw, "POST_PIXEL")),
+    *((pin_drawing.draw_label, "POST_PIXEL"), (first_run.draw, "POST_PIXEL")),
 )
 PARTS = (  # what begins with the extension, and how it ends
     (icons.load, icons.clear),
@@ -145,7 +152,17 @@ STATE += (
     previews.shown,
     first_result.steps,
 )
-STATE += (row_selection.seen, timers, style_object.cache, left_behind.seen, stored.shapes)
+STATE += (
+    row_selection.seen,
+    timers,
+    style_object.cache,
+    left_behind.seen,
+    stored.shapes,
+    applied_transforms,
+    pin_hints.status,
+    symmetry.planes,
+    first_run.welcome,
+)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread
 

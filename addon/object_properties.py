@@ -45,6 +45,7 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     skin: pointer(ARAPFIELDS_PG_skin, "Skin", "How meshes are skinned to this armature")
     bake: pointer(ARAPFIELDS_PG_bake, "Bake", "Settings of bakes, and what the last one is")
     handles: collection(ARAPFIELDS_PG_handle, "Handles", "Empties that hold and move parts of the object")
+    defaults: integer("Version of Defaults", "Which defaults the settings that were never set have")
     hold_far: flag(
         "Hold What Is Far",
         "While all handles are pins and none is an anchor, what is far from them holds its place "

@@ -16,7 +16,7 @@ CONTENTS = [  # modules with CLASSES
     *("skin.properties", "contact.properties"),
     *("properties.solve_settings", "object_properties"),
     # features
-    *("surface.operators", "surface.panel"),
+    *("tasks.panel", "surface.operators", "surface.panel"),
     *("handles.operators", "handles.resizing", "handles.left_behind", "handles.panel"),
     *("deform.operators", "deform.panel"),
     *("stylize.operators", "stylize.panel"),

@@ -19,12 +19,13 @@ ROOT = Path(__file__).resolve().parents[1]
 STEP, INNER = 28.4, 26.0  # distance of closed sections, and of those in Advanced
 LEFT, WORDS = slice(0, 258), slice(8, 120)  # columns of a section, and of its header's text
 HEADER = 22  # height of compared strips
-LAST, STATUS = 10, 72  # row of the status section, and its height with one line
+BEGINNING = 103  # of the first section, below the tasks
+ADVANCED, STATUS = 5, 72  # row of Advanced, before that of the status; height of this with one line
 SHOWN = (1280, 800)
-TOP = ("source", "handles", "deform", "stylize")
-WITHIN = ("surface", "result")
+TOP = (("handles", "panel", 0), ("deform", "panel", 1), ("stylize", "panel-style", 0))  # picture, row
+WITHIN = (("surface", 0), ("result", 3))
 WINDOW = ("handles", "running", "cancelled", "live")  # blender-NAME.webp
-MENU = (940, 167, 1284, 411)  # the menu of styles with its section's header
+MENU = (940, 185, 1284, 429)  # the menu of styles with its section's header
 
 
 def pixels(path):
@@ -47,9 +48,9 @@ def next_header(closed, row, step, beginning):
     return closed[top : top + HEADER]
 
 
-def section(folder, name, row, closed, step, beginning):
+def section(path, row, closed, step, beginning):
     """The picture of one section, from its header to the next one's."""
-    whole = pixels(folder / f"panel-{name}.png")
+    whole = pixels(path)
     end = found(next_header(closed, row, step, beginning), whole) - 2
     return whole[round(beginning + step * row) : end, LEFT]
 
@@ -61,13 +62,17 @@ def save(picture, path):
 
 def of_panel(folder, target):
     closed, advanced = pixels(folder / "panel-closed.png"), pixels(folder / "panel-advanced.png")
-    for row, name in enumerate(TOP):
-        save(section(folder, name, row, closed, STEP, 0), target / f"panel-{name}.webp")
-    first = found(next_header(closed, 8, STEP, 0), advanced) - 2 + STEP  # within Advanced
-    for name, row in zip(WITHIN, (0, 5), strict=True):
-        save(section(folder, name, row, advanced, INNER, first), target / f"panel-{name}.webp")
-    save(Image.open(folder / "panel-styles.png").convert("RGB").crop(MENU), target / "style-menu.webp")
-    top = round(STEP * LAST)
+    for name, task, row in TOP:
+        shut = pixels(folder / f"{task}-closed.png")
+        made = section(folder / f"{task}-{name}.png", row, shut, STEP, BEGINNING)
+        save(made, target / f"panel-{name}.webp")
+    header = next_header(closed, ADVANCED - 1, STEP, BEGINNING)
+    first = found(header, advanced) - 2 + STEP  # within Advanced
+    for name, row in WITHIN:
+        made = section(folder / f"panel-{name}.png", row, advanced, INNER, first)
+        save(made, target / f"panel-{name}.webp")
+    save(Image.open(folder / "panel-style-styles.png").convert("RGB").crop(MENU), target / "style-menu.webp")
+    top = round(BEGINNING + STEP * (ADVANCED + 1))
     save(pixels(folder / "panel-status.png")[top : top + STATUS, LEFT], target / "panel-status.webp")
 
 

@@ -5,7 +5,7 @@ import functools
 import json
 
 from ..blender import mesh_arrays
-from ..blender.actions import has_keys
+from ..blender.actions import varies
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError, as_user_error
@@ -34,7 +34,7 @@ def kind_of(source, kind):
     if settings.live_kind:
         return settings.live_kind
     has_handles = bool(empties.used(source))
-    styled = settings.stylize.use_handles if has_handles else has_keys(source, STYLE_PATH)
+    styled = settings.stylize.use_handles if has_handles else varies(source, STYLE_PATH)
     return "STYLIZE" if styled else "DEFORM"
 
 

@@ -46,6 +46,12 @@ def has_keys(item, path):
     return action is not None and any(curve.data_path.startswith(path) for curve in curves_of(action))
 
 
+def varies(item, path):
+    """Whether an object's own action, or a driver, moves a property whose data path starts with `path`."""
+    drivers = item.animation_data.drivers if item.animation_data is not None else ()
+    return has_keys(item, path) or any(driver.data_path.startswith(path) for driver in drivers)
+
+
 def curves_of(action):
     """An action's F-curves, of all slots."""
     for bag in bags_of(action):

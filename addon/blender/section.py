@@ -9,6 +9,22 @@ from ..names import CATEGORY, CONTEXT, Op
 from . import object_references
 from .language import translated
 
+TASKS = ("POSE", "STYLE", "WRAP", "RIG")
+
+
+def tasks_of(context):
+    """The tasks that the active object is for: all for a source, RIG for an armature alone."""
+    if object_references.source_of(context) is not None:
+        return TASKS
+    active = object_references.active_of(context)
+    return ("RIG",) if active is not None and active.type == "ARMATURE" else ()
+
+
+def tasks_now(context):
+    """The task that the panel shows, if the active object is for any."""
+    possible, chosen = tasks_of(context), context.scene.arapfields.task
+    return [chosen] if chosen in possible else list(possible)
+
 
 class Section:
     """Mixin of the sections: where they are, and that a broken library or a missing source hides them."""
@@ -18,10 +34,11 @@ class Section:
     bl_category = CATEGORY
     bl_translation_context = CONTEXT
     needs_source = True
+    tasks = frozenset(TASKS)  # the tasks in whose midst the section is shown
 
     @classmethod
     def poll(cls, context):
-        if native.problem():
+        if native.problem() or not (cls.tasks == frozenset(TASKS) or cls.tasks & set(tasks_now(context))):
             return False
         return not cls.needs_source or object_references.source_of(context) is not None
 

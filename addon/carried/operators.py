@@ -11,6 +11,8 @@ from ..handles import bones
 from ..live import sessions
 from . import carried_objects, refusals
 
+STUDIO = ("CAMERA", "LIGHT", "LIGHT_PROBE", "SPEAKER")
+
 
 class CarriedOperator(SourceOperator):
     """Mixin: works on the list of objects that the panel's source carries."""
@@ -36,9 +38,7 @@ class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
 
     def change(self, context, source):
         added, refused = 0, []
-        for item in context.selected_objects:
-            if item == source or (item.type == "EMPTY" and owner_of(item) == source):
-                continue
+        for item in candidates(context, source):
             try:
                 carry(source, item, self.way)
                 added += 1
@@ -53,6 +53,14 @@ class ARAPFIELDS_OT_carry(CarriedOperator, bpy.types.Operator):
         for text in [*refused, *([] if error is None else [translated(error)])]:
             self.report({"WARNING"}, text)
         return translated("Objects that {name} now carries as well: {count}", name=source.name, count=added)
+
+
+def candidates(context, source):
+    """The selected objects to carry: no handles, and beside other objects no cameras and lights that hang on
+    nothing, as after Select All."""
+    others = [one for one in context.selected_objects if one != source]
+    found = [one for one in others if one.type != "EMPTY" or owner_of(one) is None]
+    return [one for one in found if one.type not in STUDIO or one.parent is not None] or found
 
 
 def carry(source, item, way):

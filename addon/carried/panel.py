@@ -3,7 +3,7 @@ import bpy
 
 from ..blender.language import translated
 from ..blender.object_references import in_scene
-from ..blender.section import Section, note, wrapped
+from ..blender.section import Section, characters, note, wrapped
 from ..names import Op
 from . import refusals
 
@@ -17,13 +17,20 @@ ICONS |= {"LATTICE": "OUTLINER_OB_LATTICE", "ARMATURE": "OUTLINER_OB_ARMATURE"}
 ICONS |= {"GREASEPENCIL": "OUTLINER_OB_GREASEPENCIL"}
 
 
+SHARE, LEAST = 0.5, 8  # of the sidebar's characters: room for a name; and at least so many
+
+
 class ARAPFIELDS_UL_carried(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_propname, index):
         row = layout.row(align=True)
         if not in_scene(item.item):
             row.label(text="(deleted)", icon="ERROR")
             return
-        row.prop(item.item, "name", text="", emboss=False, icon=ICONS.get(item.item.type, "OBJECT_DATA"))
+        icon, room = ICONS.get(item.item.type, "OBJECT_DATA"), max(LEAST, int(SHARE * characters()))
+        if len(item.item.name) > room:  # the ends of names tell left from right
+            row.label(text="…" + item.item.name[1 - room :], icon=icon, translate=False)
+        else:
+            row.prop(item.item, "name", text="", emboss=False, icon=icon)
         row.prop(item, "way", text="", emboss=False)
         if refusals.of_entry(data.id_data, item) is not None:
             row.label(text="", icon="ERROR")
@@ -32,6 +39,7 @@ class ARAPFIELDS_UL_carried(bpy.types.UIList):
 class ARAPFIELDS_PT_carried(Section, bpy.types.Panel):
     bl_label = "Carried Objects"
     bl_order = 6
+    tasks = frozenset({"POSE", "STYLE", "WRAP"})
     bl_options = {"DEFAULT_CLOSED"}
 
     def fill(self, context, source, settings):

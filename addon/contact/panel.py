@@ -26,6 +26,7 @@ class ARAPFIELDS_UL_obstacles(bpy.types.UIList):
 class ARAPFIELDS_PT_contact(Section, bpy.types.Panel):
     bl_label = "Contact"
     bl_order = 8
+    tasks = frozenset({"POSE", "STYLE"})
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context):

@@ -8,10 +8,9 @@ from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_values
 from ..core.errors import UserError
-from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.parameters import DEFORM, is_fast
-from ..handles import empties, scaling
+from ..handles import empties, scaling, symmetry
 from ..handles.native_handles import native_handles
 from ..properties.choices import result_properties
 from ..solver.contact import for_job, native_contact, notes_on
@@ -43,10 +42,14 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         values = effective_values(DEFORM, settings_of(source).deform, self)
         af = native.library()
         options = options_of("deform", values)
-        handles = empties.solve_handles(source, space_of(world_matrix(source), source.name), weights)
+        space = symmetry.space_for(source, world_matrix(source), values["symmetry"])
+        handles = empties.solve_handles(source, space, weights)
+        beside = symmetry.beside(source, values["symmetry"])
+        if beside is not None:
+            self.warnings.append(about(source.name, beside))
 
         fast = is_fast(values, DEFORM)
-        contact = for_job(context, source, fast)
+        contact = for_job(context, source, fast, space)
         if not fast:
             require_no_reach(handles)
         scaled = scaling.ignored(source)
@@ -60,7 +63,8 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
             tracker.warnings += notes_on(contact, handles, field.report)
             return field
 
-        return plan_solve_job(context, self, source, "DEFORM", values["samples"], values["seed"], solve)
+        further = {"solve": solve, "space": space}
+        return plan_solve_job(context, self, source, "DEFORM", values["samples"], values["seed"], **further)
 
 
 def require_no_reach(handles):

@@ -4,7 +4,7 @@ import bpy
 from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
 from ..core.geometry.handles import nothing_held
 from ..core.settings.parameters import DEFORM
-from ..handles import empties
+from ..handles import empties, symmetry
 from ..live.panel import live_buttons, playback_progress
 from ..names import Op
 from ..results.placement import placement_refusal, replaced_by
@@ -13,6 +13,7 @@ from ..results.placement import placement_refusal, replaced_by
 class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
     bl_label = "Deform"
     bl_order = 2
+    tasks = frozenset({"POSE"})
 
     def draw_header_preset(self, context):
         presets(self.layout, "deform")
@@ -23,6 +24,7 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
         job_button(layout, Op.DEFORM, "MOD_SIMPLEDEFORM")
         settings_column(layout, settings.deform, DEFORM, advanced=False)
         playback_progress(layout, source, "DEFORM")
+        note(layout, symmetry.beside(source))
         note(
             layout, empties.require_handles(source), placement_refusal(source), replaced_by(source, "DEFORM")
         )
@@ -33,6 +35,7 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
 class ARAPFIELDS_PT_deform_settings(Advanced, bpy.types.Panel):
     bl_label = "Deform Settings"
     bl_order = 1
+    tasks = frozenset({"POSE"})
 
     def fill(self, context, source, settings):
         settings_column(self.layout, settings.deform, DEFORM, advanced=True)

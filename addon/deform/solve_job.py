@@ -31,10 +31,13 @@ from ..viewport.previews import Preview
 from .first_result import FirstResult
 
 
-def plan_solve_job(context, operator, source, kind, samples, seed, solve, places=False, finish=None):
+def plan_solve_job(
+    context, operator, source, kind, samples, seed, solve, places=False, finish=None, space=None
+):
     """The job's item. `solve(tracker, surface, samples, weight)` returns the field, on the worker.
 
-    `finish`: stylize.finish.Finish, which gives vertices that the field has moved their final places.
+    `finish(tracker, surface, points, triangles, moved)` gives vertices that the field has moved their places.
+    `space`: the solve space, by default that of the object's present matrix.
     `places`: the object's transform takes the similarity part of the result, the mesh the rest.
     """
     settings = settings_of(source)
@@ -46,7 +49,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
     exact = effective_value("surface", settings, operator) == "EXACT"
     extraction = {name: effective_value(name, settings, operator) for name in ("resolution", "refine_thin")}
     carrying, in_place = Carrying(context, source), placement.in_place(output, result)
-    further = {"exact": exact, "carrying": carrying}
+    further = {"exact": exact, "carrying": carrying, "space": space}
     surface, is_at_hand = read_at_rest(context, source, kind, in_place, output, **further)
     placed = PointsBefore(surface, surface.local if is_at_hand else points_now(context, source, surface))
     carried = carrying.poses(surface.space, depsgraph_of(context))
@@ -67,7 +70,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
         own = field(surface.vertices, triangles=surface.faces) if needs_own else None
         if own is not None:
             if finish is not None and surface.faces is not None:
-                own = finish.finished(tracker, surface, surface.vertices, surface.faces, own, 1.0)
+                own = finish(tracker, surface, surface.vertices, surface.faces, own)
             own = placed.moved(own, field)
         if output == "REMESH":
             after, topology, figures = surface.extract_moved(tracker, field, **extraction)
@@ -76,7 +79,7 @@ def plan_solve_job(context, operator, source, kind, samples, seed, solve, places
             extracted, topology = surface.extract(tracker, 0.1, **extraction)
             after = field(extracted)
             if finish is not None:
-                after = finish.finished(tracker, surface, extracted, topology.corners, after, 1.0)
+                after = finish(tracker, surface, extracted, topology.corners, after)
         else:
             after = own
         if not np.isfinite(after).all():
@@ -177,10 +180,9 @@ def describe(shown, report, size):
         near = max(report["to_target_mean"], report["from_target_mean"])
         figures.append(translated("{share} of the target's size off on average", share=f"{near:.2%}"))
     if report.get("flipped_share"):
-        share, worst = f"{report['flipped_share']:.1%}", f"{report['min_determinant']:.2g}"
-        figures.append(translated("{share} folded (det J down to {worst})", share=share, worst=worst))
+        figures.append(translated("{share} of it is folded over", share=f"{report['flipped_share']:.1%}"))
     elif "flipped_share" in report:
-        figures.append(translated("nothing folded"))
+        figures.append(translated("no folds"))
     if report.get("far_target"):
         sizes = f"{report['far_target']:.0f}"
         figures.append(translated("a target is {sizes} times the object's size away", sizes=sizes))

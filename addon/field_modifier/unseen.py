@@ -2,7 +2,7 @@
 """Checks whether the user has disabled the field's modifier, or something does not follow it."""
 
 from ..blender import modifier_stack
-from ..blender.actions import has_keys
+from ..blender.actions import varies
 from ..core.errors import UserError
 from . import inputs
 
@@ -31,9 +31,7 @@ def standing(source):
 def switched_off(source, modifier):
     if modifier.show_viewport and inputs.get(modifier, "Factor") != 0.0:
         return []
-    path, data = f'modifiers["{modifier.name}"]', source.animation_data
-    drivers = data.drivers if data is not None else ()
-    if has_keys(source, path) or any(driver.data_path.startswith(path) for driver in drivers):
+    if varies(source, f'modifiers["{modifier.name}"]'):
         return []
     return [
         UserError("The modifier {modifier} of {name} is off, or its Factor 0", source, modifier=modifier.name)

@@ -5,15 +5,17 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..blender import mesh_arrays, modifier_stack, vertex_groups
+from ..blender import former_defaults, mesh_arrays, modifier_stack, vertex_groups
+from ..blender.evaluation import is_driven
 from ..blender.object_references import in_scene, settings_of
 from ..blender.point_data import selection_of
 from ..blender.property_definitions import from_single_precision
 from ..blender.selection import choose_row
 from ..core.errors import UserError, refuse
 from ..core.geometry.handles import far_handle, solve_handle
-from ..core.geometry.spaces import inverse, transform
+from ..core.geometry.spaces import Space, inverse, transform
 from ..core.runtime.coroutines import run_to_completion
+from ..names import HANDLES, HANDLES_MARK
 from . import movers, naming, symmetry
 from .movers import box_now, current_box, has_mover, matrix_of, name_of
 from .palette import free_colour
@@ -26,8 +28,7 @@ def rest_box(source, entry, where=matrix_of):
 
 def store_rest(source, entry):
     """Stores the present pose of the handle's Empty or bone as its rest pose."""
-    relative = inverse(matrix_of(source)) @ box_now(entry)
-    entry.rest, entry.unwrapped = relative.ravel(), np.zeros(16)
+    entry.rest, entry.unwrapped = movers.box_in_source(entry).ravel(), np.zeros(16)
     entry.frame = bpy.context.scene.frame_current
 
 
@@ -71,22 +72,29 @@ def group_names(source):
     return [movers.group_of(e) for e in used(source) if e.kind == "GROUP" or (e.kind == "BONE" and e.group)]
 
 
-def solve_handles(source, space, weights=None, where=matrix_of):
+def solve_handles(source, space, weights=None, where=matrix_of, rendered=None):
     """All handles of a source for the solver; UserError without any.
 
     `weights`: of the vertex groups, by name; without them, the handles have targets only.
-    `where(object, bone)`: the world matrix of an object or of its pose bone.
+    `where(object, bone)`: the world matrix of an object or of its pose bone. `rendered`: the depsgraph of a
+    render that it reads.
     """
     refuse(lost_bone(source))
     handles = []
     for entry in used(source):
-        boxes = movers.rest_of(entry), where(source), box_now(entry, where)
+        if movers.is_child(entry):
+            at, stretch = Space(space.local_to_solve, np.eye(4)), space.local_to_solve
+            world, now = stretch, stretch @ movers.box_in_source(entry, where, rendered)
+        else:
+            at, world, now = space, where(source), box_now(entry, where)
         group = movers.group_of(entry) if entry.kind in ("GROUP", "BONE") else ""
         held = weights[group] if weights and group else None
         options = {"weights": held, "weight": entry.weight, "hold_from": entry.hold_from}
         options["reach"] = from_single_precision(entry.reach)
         options["allow_scale"] = entry.allow_scale and entry.kind != "POINT"
-        handles.append(solve_handle(name_of(entry), entry.kind, *boxes, space, **options))
+        handles.append(
+            solve_handle(name_of(entry), entry.kind, movers.rest_of(entry), world, now, at, **options)
+        )
     if not handles:
         raise UserError("{name} has no handle; add one in the panel's Handles section", source)
     centers, beyond = kept_rest(source)
@@ -133,6 +141,8 @@ def add(source, empty, kind="CUBE"):
     entry = choose_or_add(settings, find(source, empty))
     entry.empty, entry.kind, entry.rig, entry.bone = empty, kind, None, ""
     settings_of(empty).handle_of = source
+    if empty.parent is None and empty.library is None and not is_driven(empty):
+        movers.attach(empty, source)
     empty.empty_display_type = SHAPES[kind]
     store_rest(source, entry)
     return entry
@@ -141,6 +151,8 @@ def add(source, empty, kind="CUBE"):
 def choose_or_add(settings, index):
     """The handle in that row, or a new one for -1; makes its row active."""
     if index < 0:
+        if not settings.handles:
+            former_defaults.begin(settings)
         index, colour = len(settings.handles), free_colour(settings.handles)
         settings.handles.add().colour = colour
     choose_row(settings, index)
@@ -148,14 +160,34 @@ def choose_or_add(settings, index):
 
 
 def make_empty(context, source, matrix, size, name):
-    """A new cube Empty beside the source in its collection."""
+    """A new cube Empty, a child of the source, in the collection of handles beside it."""
     empty = bpy.data.objects.new(name, None)
     empty.empty_display_type, empty.empty_display_size = "CUBE", size
-    home = next((c for c in source.users_collection if c in editable(context)), context.collection)
-    home.objects.link(empty)
-    empty.matrix_world = matrix
+    home_of(context, source).objects.link(empty)
+    empty.matrix_basis = matrix
+    movers.attach(empty, source)
     context.view_layer.update()
     return empty
+
+
+def home_of(context, source):
+    """The collection of handles within that of the source; made if there is none."""
+    around = next((c for c in source.users_collection if c in editable(context)), context.collection)
+    home = next((one for one in around.children if one.get(HANDLES_MARK) and one.library is None), None)
+    if home is None:
+        home = bpy.data.collections.new(HANDLES)
+        home[HANDLES_MARK] = True
+        around.children.link(home)
+    return home
+
+
+def delete(empty):
+    """Deletes an Empty, and with the last one the collection of handles."""
+    homes = [one for one in empty.users_collection if one.get(HANDLES_MARK)]
+    bpy.data.objects.remove(empty)
+    for home in homes:
+        if not home.all_objects and not home.children and home.library is None:
+            bpy.data.collections.remove(home)
 
 
 def editable(context):

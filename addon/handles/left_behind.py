@@ -57,7 +57,7 @@ class ARAPFIELDS_OT_delete_left(ReportingOperator, bpy.types.Operator):
     def change(self, context, source):
         left = {one.name: items for one, items in of_deleted().items()}
         for empty in left.get(self.source, ()):
-            bpy.data.objects.remove(empty)
+            empties.delete(empty)
 
 
 CLASSES = [ARAPFIELDS_OT_delete_left]

@@ -3,11 +3,15 @@
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
-from ..blender.evaluation import is_disabled, is_moved, world_matrix
+from ..blender.evaluation import is_disabled, is_moved, with_ancestors, world_matrix
 from ..blender.object_references import in_scene, settings_of
+from ..blender.property_definitions import listeners
+from ..blender.references import parts_of, references
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix
+from ..core.geometry.spaces import inverse
 from ..names import BONE_NUMBER
 
 
@@ -50,6 +54,67 @@ def rest_of(entry):
 def current_box(empty, where=matrix_of):
     """(4, 4) cube [-1, 1]³ → world, of an Empty's present box."""
     return box_matrix(where(empty), empty.empty_display_size)
+
+
+def is_child(entry):
+    """Whether a handle belongs to its object: its Empty is a child of it that nothing else moves."""
+    empty = entry.empty if entry.kind != "BONE" else None
+    if empty is None or empty.parent != entry.id_data or empty.parent_type != "OBJECT":
+        return False
+    return all(constraint.mute for constraint in empty.constraints)
+
+
+def box_in_source(entry, where=matrix_of, rendered=None):
+    """(4, 4) cube [-1, 1]³ → the source's coordinates, of a handle's present box.
+
+    Of a child it does not depend on the source's place, not even in its last bits. `rendered`: a render's
+    depsgraph to read it from.
+    """
+    if not is_child(entry):
+        return inverse(where(entry.id_data)) @ box_now(entry, where)
+    empty = entry.empty if rendered is None else entry.empty.original.evaluated_get(rendered)
+    own = np.array(empty.matrix_parent_inverse, dtype=np.float64) @ np.array(empty.matrix_basis)
+    return box_matrix(own, empty.empty_display_size)
+
+
+def attach(empty, source):
+    """Makes an Empty a child of the source, in its place; one that the source follows stays as it is."""
+    world = matrix_of(source)
+    if any(empty in followed(one) for one in with_ancestors(source)) or not np.linalg.det(world[:3, :3]):
+        return
+    empty.parent, empty.parent_type = source, "OBJECT"
+    empty.matrix_parent_inverse = Matrix(inverse(world).tolist())
+
+
+def followed(item):
+    """The data-blocks that may move an object: itself, and those that its modifiers, constraints and drivers
+    read."""
+    return [item, *(value for part in parts_of(item) for _, value in references(part))]
+
+
+def detach(empty):
+    """Makes an Empty nothing's child, in its place."""
+    matrix = Matrix(matrix_of(empty).tolist())
+    empty.parent = None
+    empty.matrix_world = matrix
+
+
+def put_in_world(entry, is_held):
+    """Has a handle stay in the world, or move with its object."""
+    if entry.kind == "BONE" or entry.empty is None or is_held == in_world(entry):
+        return
+    if entry.empty.parent is not None:
+        detach(entry.empty)
+    if not is_held:
+        attach(entry.empty, entry.id_data)
+
+
+def in_world(entry):
+    """Whether a handle's Empty is no child of its object."""
+    return entry.empty is None or entry.empty.parent != entry.id_data
+
+
+listeners["in_world"] = put_in_world
 
 
 def bone_of(entry):

@@ -157,7 +157,7 @@ class RestOperator(HandleOperator):
 
 
 class ARAPFIELDS_OT_set_rest(RestOperator, bpy.types.Operator):
-    """Make where the selected handles are now their rest pose (all handles with `all`)"""
+    """Take where the selected handles are now as their rest pose: there they move nothing any more"""
 
     bl_label = "Set Rest Pose"
     counts_points = True
@@ -171,9 +171,9 @@ class ARAPFIELDS_OT_set_rest(RestOperator, bpy.types.Operator):
 
 
 class ARAPFIELDS_OT_reset_handle(RestOperator, bpy.types.Operator):
-    """Move the selected handles back to their rest pose (all handles with `all`)"""
+    """Move the selected handles back to where they were at rest, and the shape with them"""
 
-    bl_label = "Reset to Rest"
+    bl_label = "Move Back to Rest"
 
     def change(self, context, source):
         entries = self.entries(context, source)
@@ -200,7 +200,7 @@ class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
             is_own = empty is not None and settings_of(empty).handle_of == source
             empties.remove(source, index)
             if self.delete and is_own:
-                bpy.data.objects.remove(empty)
+                empties.delete(empty)
         return translated("Handles removed: {count}", count=len(rows))
 
 

@@ -77,7 +77,7 @@ class ARAPFIELDS_MT_more_handle(bpy.types.Menu):
         layout = self.layout
         layout.operator_menu_enum(Op.MIRROR_HANDLE, "axis", icon="MOD_MIRROR")
         layout.operator(Op.SET_REST, text="Set Rest Pose of All", icon="PINNED").all = True
-        layout.operator(Op.RESET_HANDLE, text="Reset All to Rest", icon="LOOP_BACK").all = True
+        layout.operator(Op.RESET_HANDLE, text="Move All Back to Rest", icon="LOOP_BACK").all = True
         layout.separator()
         layout.operator(Op.REMOVE_HANDLE, text="Delete with Empties", icon="TRASH").delete = True
 
@@ -85,6 +85,7 @@ class ARAPFIELDS_MT_more_handle(bpy.types.Menu):
 class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
     bl_label = "Handles"
     bl_order = 1
+    tasks = frozenset({"POSE"})
 
     def fill(self, context, source, settings):
         layout = self.layout
@@ -101,14 +102,15 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
             return
         if all(entry.kind in empties.PINS for entry in settings.handles):
             switched(layout, settings, "keep_rest", "keep_beyond")
-        column = layout.column(align=True)
-        column.operator(Op.SET_REST, icon="PINNED")
-        column.operator(Op.RESET_HANDLE, icon="LOOP_BACK")
+        layout.operator(Op.RESET_HANDLE, icon="LOOP_BACK")
+        layout.operator(Op.SET_REST, icon="PINNED")
         if 0 <= settings.active_handle < len(settings.handles):
             entry = settings.handles[settings.active_handle]
             draw_settings(layout, entry, "weight", "reach")
             if entry.kind in empties.PINS:
                 draw_settings(layout, entry, "hold_turn")
+            if entry.kind != "BONE":
+                draw_settings(layout, entry, "in_world")
             if entry.kind != "POINT":
                 draw_settings(layout, entry, "allow_scale")
             if entry.kind in ("GROUP", "BONE"):

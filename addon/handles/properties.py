@@ -61,6 +61,14 @@ class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
         get=lambda entry: entry.kind != "POINT",
         set=lambda entry, holds: listeners["hold_turn"](entry, holds),
     )
+    in_world: flag(
+        "World",
+        "Stays where it is when the object is moved, like a foot on the ground; otherwise it moves with it",
+        get=lambda entry: (
+            entry.kind != "BONE" and (entry.empty is None or entry.empty.parent != entry.id_data)
+        ),
+        set=lambda entry, is_held: listeners["in_world"](entry, is_held),
+    )
     colour: colour("Colour of the handle's boxes in the viewport")
     rest: bpy.props.FloatVectorProperty(
         size=16,

@@ -30,11 +30,11 @@ def remarks(source):
     shown = modifier_stack.shown_before(source, settings_of(source).in_place)
     after = [m.name for m in modifier_stack.shown_before(source, False) if m not in shown]
     if shown:
-        yield translated("Read with its modifiers applied ({count})", count=len(shown))
+        yield translated("Works on the shape that {names} make", names=", ".join(m.name for m in shown))
     if after:
-        yield translated("Read before {names}", names=", ".join(after))
+        yield translated("Works before {names}", names=", ".join(after))
     if shape_keys_of(source.data):
-        yield translated("Read with its shape keys as they are set")
+        yield translated("Works on the shape keys as they are set now")
 
 
 class ARAPFIELDS_PT_status(Section, bpy.types.Panel):

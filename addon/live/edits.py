@@ -10,13 +10,13 @@ import numpy as np
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.evaluation import is_animated
 from ..blender.object_references import settings_of
-from ..core.geometry.spaces import SAME_STRETCH, space_of
+from ..core.geometry.spaces import SAME_STRETCH
 from ..field_modifier import motion
 from ..field_nodes import helper
-from ..handles import empties, movers
+from ..handles import empties, movers, symmetry
 from ..handles.empties import matrix_of
 from ..solver import secondary_motion
-from ..solver.source_reader import SourceChanged, rest_frame, uses_handles
+from ..solver.source_reader import SourceChanged, rest_frame, solve_space, uses_handles
 from ..stiffness import painted
 
 STROKE = 0.3  # seconds without new weights after which a brush stroke counts as ended
@@ -88,7 +88,7 @@ class EditWatch:
         check's; by more than SAME_STRETCH while the source moves."""
         world = matrix_of(source)
         rests, self.world = np.array_equal(world, self.world), world
-        now = space_of(world, source.name)
+        now = solve_space(source, world, self.reader.kind)
         return not now.is_like(self.reader.surface.space, 0.0 if rests else SAME_STRETCH)
 
     def is_in_stroke(self, source):
@@ -122,10 +122,12 @@ def layout_of(source, kind, scene):
     further = (settings.output, settings.result, settings.surface)
     further += (stiffness.group, stiffness.times, stiffness.bend_group, stiffness.bend_times)
     if kind == "STYLIZE":
-        further += (style.region, style.region_material, style.use_handles)
+        further += (style.region, style.region_material, style.use_handles, style.samples, style.seed)
     further += tuple((e.item.session_uid if e.item else 0, e.way) for e in settings.carried)
     further += (secondary_motion.layout_of(source, scene), helper.of(source) is not None)
     further += (rest_frame(source, kind, settings.in_place),)
+    if kind == "DEFORM":
+        further += (symmetry.offset_of(source),)
     used = uses_handles(settings, kind)
     return (held if used else [], used and empties.kept_rest(source), further, stack_of(source))
 

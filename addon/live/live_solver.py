@@ -13,7 +13,7 @@ from .prefetch import prefetch
 STEPS, MOST_SHAPES = 3, 60  # quasi-Newton iterations per shape, and most shapes per request
 # A shape is shown once no point has moved by more than NEAR times the size since the last one: the converged
 # shape is then at most four times as far. After LATEST seconds every shape is shown. A newer request waits
-# until one is shown.
+# until one is shown. A style's solve from rest, which is finished on the mesh, comes soon after that.
 NEAR, LATEST = 7e-4, 0.2
 TOLERANCE = 3e-5  # limit of single precision; the last shape is within about 0.3 % of the size
 # A time step of secondary motion is one to MOST_PACES times PACE seconds: each length has its preconditioner.
@@ -70,7 +70,7 @@ class LiveSolver:
             taken = self.frame_solver.follow(request, iterations=STEPS, tolerance=TOLERANCE)
             if self._is_near() or taken < STEPS or time.monotonic() > latest:
                 yield self.frame_solver.tracked_shape(request)
-            if taken < STEPS:
+            if taken < STEPS or (request.style is not None and time.monotonic() > latest):
                 break
 
     def _is_near(self):

@@ -17,7 +17,7 @@ from . import sessions
 
 
 class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
-    """Let the shape follow handles or style while these change; again to stop, which takes that back"""
+    """Let the shape follow handles or style while these change; again to stop, which keeps a shape of pins"""
 
     bl_label = "Live"
     guide = "deform"

@@ -6,7 +6,7 @@ import bpy
 from ..blender import vertex_groups
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
-from ..blender.section import Section, draw_settings, group_row, note, settings_column, switched
+from ..blender.section import Advanced, draw_settings, group_row, note, settings_column, switched
 from ..names import Op
 from ..solver import secondary_motion
 from ..solver.frame_range import scene_range
@@ -47,10 +47,10 @@ def playback_progress(layout, source, kind):
         layout.progress(factor=count / max(1, total), text=text)
 
 
-class ARAPFIELDS_PT_secondary(Section, bpy.types.Panel):
+class ARAPFIELDS_PT_secondary(Advanced, bpy.types.Panel):
     bl_label = "Secondary Motion"
-    bl_order = 7
-    bl_options = {"DEFAULT_CLOSED"}
+    bl_order = 6
+    tasks = frozenset({"POSE"})
 
     def draw_header(self, context):
         self.layout.prop(settings_of(source_of(context)).secondary, "use", text="")

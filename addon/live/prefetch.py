@@ -3,12 +3,14 @@
 
 import numpy as np
 
+from ..blender.evaluation import world_matrix
 from ..blender.host import has_window
 from ..blender.object_references import settings_of
 from ..blender.point_data import points_of
 from ..blender.user_preferences import machine_options
 from ..core.errors import UserError
 from ..core.runtime.threads import start_thread
+from ..handles import symmetry
 from ..results import placement
 from ..solver.frame_solver import FrameSolver
 from ..solver.setup import SolverSetup, energy_weights, sampled
@@ -33,7 +35,8 @@ class SolverPrefetch:
         self.clear()
         self._uid = source.session_uid
         try:
-            surface = read_surface(context, source, in_place=True)
+            space = symmetry.space_for(source, world_matrix(source))
+            surface = read_surface(context, source, in_place=True, space=space)
         except UserError:
             return
         setup = SolverSetup("DEFORM", surface, None, energy_weights(settings, "DEFORM"), machine_options())

@@ -4,6 +4,8 @@
 import contextlib
 import itertools
 import time
+from collections import deque
+from typing import NamedTuple
 
 import bpy
 
@@ -17,6 +19,8 @@ from ..field_modifier import layers, motion, unseen
 from ..results import placement, visibility
 from ..solver import secondary_motion, style_settings
 from ..solver.frame_range import animation_range
+from ..solver.frame_solver import Shape
+from ..solver.request import Request
 from ..solver.source_reader import SourceChanged, SourceReader
 from . import stored
 from .display import Former, display_of
@@ -25,8 +29,16 @@ from .live_modifier import PAUSING
 from .live_solver import PACE, LiveSolver
 from .playback import Playback, scene_frame
 
+REMEMBERED = 8  # number of shapes at rest that a cancelled move may return to
 PATIENCE = 1.0  # seconds at most that playback waits for a frame of secondary motion
 numbers = itertools.count(int(time.time()) % 10**9)  # of sessions; unlike those of an earlier process
+
+
+class AtRest(NamedTuple):
+    """A shape solved from rest, and its request; `shape` is None where the file had it."""
+
+    request: Request
+    shape: Shape | None
 
 
 class Session:
@@ -49,6 +61,7 @@ class Session:
         is_still = keeps_shape or animation_range(source, kind) is None
         self.playback = Playback(self.solver, scene_frame(context.scene) if is_still else None)
         self.requested = None  # the newest Request
+        self.at_rest = deque(maxlen=REMEMBERED)  # of AtRest: the last shapes on display that were at rest
         self.touching = None  # (k, 3) contact points of the shape on display, in local coordinates
         self.is_restored = earlier is not None  # whether the shape in the file may be the current request's
         self.is_held = False  # whether that shape counts as the request's without a comparison
@@ -145,6 +158,7 @@ class Session:
         self.set_request(request, scene_frame(context.scene))
         if self.is_restored:
             self.is_restored, self.is_quiet = False, True
+            self.at_rest.append(AtRest(request, None))
             self.keep_shown()
 
     def waits(self, source):
@@ -192,9 +206,24 @@ class Session:
             self.requested, self.is_quiet = request, self.is_restored
             if self.is_quiet:
                 self.touching = None  # of the shape before; solving this request finds its own
+            else:
+                self.is_quiet = self.go_back(request)
             if self.playback.begin(request, frame):
                 self.worker.request(request)
         self.playback.advance(self.requested, frame)
+
+    def go_back(self, request):
+        """Shows the shape of this request again, bit for bit, if it was at rest: a move of what it follows
+        was cancelled. Returns whether that is so; secondary motion swings back instead."""
+        if request.motion is not None or self.playback.frames is not None:
+            return False
+        source = self.source.get()
+        known = next((one for one in reversed(self.at_rest) if request.is_like(one.request)), None)
+        if known is None:
+            return False
+        if known.shape is None:
+            return self.display.in_place and stored.recall(source, self.digest(request))
+        return self.show_shape(source, known.shape)
 
     def restored(self, is_held=False):
         """Called after undo or a cancelled drag has changed the source and its handles.
@@ -217,11 +246,20 @@ class Session:
             if shape.of is not None and stored.mark(source) == self.digest(shape.of):
                 self.touching = shape.touching
                 redraw(bpy.context, "WINDOW")
-        elif self.display.show(source, shape):
-            self.touching = shape.touching
-            self.carrying.show(shape.carried)
-            if self.display.in_place:
-                stored.note(source, "" if shape.of is None else self.digest(shape.of), shape)
+        else:
+            self.show_shape(source, shape)
+
+    def show_shape(self, source, shape):
+        """Shows a shape with what the source carries; returns whether the display could."""
+        if not self.display.show(source, shape):
+            return False
+        self.touching = shape.touching
+        self.carrying.show(shape.carried)
+        if self.display.in_place:
+            stored.note(source, "" if shape.of is None else self.digest(shape.of), shape)
+        if shape.of is not None and all(one.shape is not shape for one in self.at_rest):
+            self.at_rest.append(AtRest(shape.of, shape))
+        return True
 
     def show_frame(self, context):
         """Shows the current frame if it is solved; with secondary motion, waits up to PATIENCE for it."""

@@ -177,7 +177,7 @@ def make_way(context, source):
 def of_entry(context, source, entry):
     """A drag of an existing handle."""
     before = Snapshot(context, source, *make_way(context, source))
-    pins.select(context, entry.empty)
+    pins.choose(context, entry.empty)
     return Drag(context, before, entry.empty)
 
 

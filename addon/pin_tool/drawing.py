@@ -4,11 +4,13 @@
 With symmetry, also faint discs at the mirrored pins.
 """
 
+import blf
 import bpy
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
+from ..blender.language import translated
 from ..core.geometry.spaces import transform
 from ..handles import empties, movers, symmetry
 from ..names import TOOL
@@ -35,6 +37,7 @@ ANCHOR_STROKES = (  # of a square from -1 to 1
     0.17 * np.concatenate([CIRCLE, CIRCLE[:1]]) + (0, 0.6),
 )
 ENOUGH = 8  # least number of highlighted triangles; with fewer, a disc is drawn
+SIZE, OFFSET = 12, 16  # of the label and its distance from the cursor, in pixels
 GHOST = 0.35  # opacity of mirrored discs
 LIFT = 1.5  # offset of the highlight towards the viewer, in pixels
 
@@ -102,6 +105,24 @@ def draw():
     for _, entry in handles:
         draw_handle(brush, entry, target, entry.empty == pins.chosen(context))
     gpu.state.blend_set("NONE")
+
+
+def draw_label():
+    """What a press does, or that it has missed, beside the cursor."""
+    context, spot = bpy.context, hover.missed or hover.pixel
+    if context.region_data is None or spot is None or hover.drag is not None or not is_active(context):
+        return
+    text = translated("Nothing to pin here") if hover.missed else hover.label
+    if not text or hover.region != context.region.as_pointer():
+        return
+    scale = context.preferences.system.ui_scale
+    blf.size(0, SIZE * scale)
+    blf.enable(0, blf.SHADOW)
+    blf.shadow(0, 5, 0.0, 0.0, 0.0, 0.9)
+    blf.color(0, 1.0, 1.0, 1.0, 1.0)
+    blf.position(0, spot[0] + OFFSET * scale, spot[1] + OFFSET * scale, 0)
+    blf.draw(0, text)
+    blf.disable(0, blf.SHADOW)
 
 
 def ghosts(handles):

@@ -7,7 +7,7 @@ import numpy as np
 from bpy_extras import view3d_utils
 
 from ..blender import mesh_arrays
-from ..blender.object_references import ObjectReference, settings_of
+from ..blender.object_references import ObjectReference, settings_of, source_of
 from ..blender.splat_layouts import holds_splats
 from ..carried import carried_objects
 from ..core.geometry.spaces import inverse, transform
@@ -25,7 +25,8 @@ RING, RING_REACH = (
 
 @dataclass(frozen=True)
 class Target:
-    """`kind` is HANDLE, RING, SURFACE, or REFUSED for an object that cannot be pinned."""
+    """`kind` is HANDLE, RING, SURFACE, REFUSED for an object that cannot be pinned, or OTHER for one that is
+    not the tool's object."""
 
     kind: str
     source: ObjectReference
@@ -39,13 +40,14 @@ class Target:
 
 
 class Hover:
-    """The target at the last mouse move, and whether a drag is running."""
+    """The target and the pixel of the last mouse move, the running drag, and where a press has missed."""
 
     def __init__(self):
         self.clear()
 
     def clear(self):
-        self.target = self.drag = None
+        self.target = self.drag = self.pixel = self.missed = self.region = None
+        self.label = ""  # what a press does there
 
 
 hover = Hover()
@@ -82,10 +84,11 @@ class View:
         return self.view.view_rotation @ type(self.view.view_location)((0, 0, 1))
 
 
-def under(context, view, lights=False):
+def under(context, view, lights=False, other=False):
     """The Target under the cursor, or None. Handles take precedence, even behind the mesh.
 
-    `lights`: also finds the triangles to highlight, which is slow on a large mesh.
+    `lights`: also finds the triangles to highlight, which is slow on a large mesh. `other`: an object that is
+    not the tool's is a SURFACE as well.
     """
     handles = pins.handles_in_view(context)
     spots = screen.project(
@@ -102,19 +105,30 @@ def under(context, view, lights=False):
         away = np.linalg.norm(spot - view.pixel) - RING * view.scale
         if entry.empty == active and not entry.anchor and abs(away) <= RING_REACH * view.scale:
             return Target("RING", ObjectReference(source), ObjectReference(active))
-    return surface(context, view, lights)
+    return surface(context, view, lights, None if other else object_of(context))
 
 
-def surface(context, view, lights):
-    """The Target of the first surface along the line of sight; None if it cannot be pinned."""
+def object_of(context):
+    """The tool's object: the active one, or its carrier; None where none is active that has a surface."""
+    source = source_of(context)
+    if source is None or not pins.is_own(source) or not source.visible_get():
+        return None
+    return carrier_of(source) or source
+
+
+def surface(context, view, lights, own=None):
+    """The Target of the first surface along the line of sight; None if it cannot be pinned. `own`: the tool's
+    object, or None for any."""
     depsgraph = context.evaluated_depsgraph_get()
     met, location, normal, face, item, matrix = context.scene.ray_cast(depsgraph, *view.ray())
-    splat = splat_under(context, view)
+    splat = splat_under(context, view, own)
     if splat is not None and (not met or (splat.location - np.array(location)) @ view.towards > 0):
         return splat
     if not met or not pins.is_own(item.original) or matrix != item.original.matrix_world:
         return None
     source = carrier_of(item.original)
+    if own not in (None, source or item.original):
+        return Target("OTHER", ObjectReference(source or item.original))
     if source is not None:
         location, normal, face = beneath(source.evaluated_get(depsgraph), view.ray(), location)
     else:
@@ -155,7 +169,7 @@ def beneath(carrier, ray, location):
     return world @ place, (local.to_3x3().transposed() @ normal).normalized(), face
 
 
-def splat_under(context, view):
+def splat_under(context, view, own):
     """The Target of the splat under the cursor that is nearest to the viewer, or None."""
     best, towards = None, np.array(view.towards)
     for source in context.visible_objects:
@@ -177,6 +191,8 @@ def splat_under(context, view):
     if best is None:
         return None
     source, location = best
+    if own not in (None, source):
+        return Target("OTHER", ObjectReference(source), location=location)
     if pins.refusal(source) is not None:
         return Target("REFUSED", ObjectReference(source), location=location)
     radius = context.scene.arapfields.pin_radius * screen.pixel_size(view.perspective, view.size, location)

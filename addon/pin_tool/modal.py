@@ -9,7 +9,7 @@ from ..blender.source_operator import ReportingOperator
 from ..core.errors import UserError
 from ..core.runtime import native
 from ..live import sessions
-from . import screen
+from . import hints, screen
 from .hover import View, hover
 
 TICK = 0.05  # seconds between timer events while the shape settles
@@ -51,6 +51,7 @@ class Dragging(PinOperator):
         hover.drag = dragged
         self.grab(view, view.pixel)
         context.window_manager.modal_handler_add(self)
+        hints.refresh()
         redraw(context, "WINDOW", "UI")
         return {"RUNNING_MODAL"}
 
@@ -130,6 +131,7 @@ class Dragging(PinOperator):
             self.timer = None
         if hover.drag is self.drag:
             hover.clear()
+        hints.refresh()
         redraw(context, "WINDOW", "UI")
         return result
 

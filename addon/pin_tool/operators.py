@@ -5,11 +5,12 @@ import numpy as np
 from ..blender.object_references import owner_of
 from ..blender.property_definitions import flag, number
 from ..blender.redraw import redraw
+from ..blender.selection import select_alone
 from ..core.errors import UserError
 from ..live import sessions
 from ..live.prefetch import prefetch
 from ..names import TOOL
-from . import drag, pins
+from . import drag, hints, pins
 from .hover import View, hover, under
 from .modal import Dragging, PinOperator
 
@@ -26,6 +27,18 @@ def drag_of_new_pin(context, source, target, **further):
     """Places a pin on the surface under the cursor and starts its Drag."""
     where = {"face": target.face, "face_count": target.face_count}
     return drag.of_new_pin(context, source, target.location, target.radius, **where, **further)
+
+
+def view_at_press(context, event):
+    """The View of a press, with the pixel where the button went down.
+
+    Where Blender is late, as after a long update, the event has the cursor's later place.
+    """
+    view = View(context, event)
+    last = event.mouse_prev_x - context.region.x, event.mouse_prev_y - context.region.y
+    if hover.region == context.region.as_pointer() and hover.pixel == last:
+        view.pixel = last
+    return view
 
 
 class ARAPFIELDS_OT_pin_tool(PinOperator, bpy.types.Operator):
@@ -47,7 +60,12 @@ class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
 
     def invoke(self, context, event):
         if context.region_data is not None and hover.drag is None:
-            before, hover.target = hover.target, under(context, View(context, event), lights=True)
+            view = View(context, event)
+            before = hover.target or hover.missed
+            hover.target, hover.missed = under(context, view, lights=True, other=event.alt), None
+            hover.pixel, hover.region = view.pixel, context.region.as_pointer()
+            hover.label = "" if hover.target is None else hints.label(hover.target)
+            hints.refresh()
             if before is not None or hover.target is not None:
                 context.region.tag_redraw()
             source = hover.target.source.find() if hover.target is not None else None
@@ -61,11 +79,16 @@ class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
 
     bl_label = "ARAP Pin: Drag"
 
+    other: flag("Any Object", "Pin the object under the cursor, active or not", options={"SKIP_SAVE"})
+
     def invoke(self, context, event):
-        view = View(context, event)
-        target = under(context, view)
+        view = view_at_press(context, event)
+        target = under(context, view, other=self.other)
         if target is None:
-            return {"PASS_THROUGH"}
+            return self.miss(context, view)
+        if target.kind == "OTHER":
+            self.report({"INFO"}, hints.label(target))
+            return {"CANCELLED"}
         try:
             source = source_of_target(target)
             if target.kind == "SURFACE":
@@ -73,11 +96,17 @@ class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
                 return self.start(context, view, drag_of_new_pin(context, source, target, kind=kind), "MOVE")
             entry = pins.entry_of(target.empty.get())
             if entry.anchor:
-                return {"FINISHED"} if pins.select(context, entry.empty) else {"CANCELLED"}
+                return {"FINISHED"} if pins.choose(context, entry.empty) else {"CANCELLED"}
             dragged = drag.of_entry(context, source, entry)
             return self.start(context, view, dragged, "TURN" if target.kind == "RING" else "MOVE")
         except (UserError, ValueError) as error:
             return self.refuse(error)
+
+    def miss(self, context, view):
+        """Shows that a press has met nothing."""
+        hover.missed, hover.pixel, hover.region = view.pixel, view.pixel, context.region.as_pointer()
+        context.region.tag_redraw()
+        return {"PASS_THROUGH"}
 
 
 class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
@@ -87,16 +116,19 @@ class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
     bl_options = {"UNDO"}
 
     def invoke(self, context, event):
-        target = under(context, View(context, event))
+        target = under(context, view_at_press(context, event))
         if target is None:
             return {"PASS_THROUGH"}
+        if target.kind == "OTHER":
+            self.report({"INFO"}, hints.label(target))
+            return {"CANCELLED"}
         try:
             source = source_of_target(target)
             if target.kind == "SURFACE":
                 drag_of_new_pin(context, source, target, anchor=True).end(context)
             else:
                 entry = pins.entry_of(target.empty.get())
-                pins.select(context, entry.empty)
+                pins.choose(context, entry.empty)
                 entry.anchor = not entry.anchor
                 drag.of_entry(context, source, entry).end(context)
         except (UserError, ValueError) as error:
@@ -142,7 +174,7 @@ class ARAPFIELDS_OT_pin_delete(PinOperator, bpy.types.Operator):
     def invoke(self, context, event):
         if not self.under:
             return self.execute(context)
-        target = under(context, View(context, event))
+        target = under(context, view_at_press(context, event))
         empty = target.empty.find() if target is not None and target.kind == "HANDLE" else None
         return self.delete(context, empty)
 
@@ -174,6 +206,7 @@ class ARAPFIELDS_OT_pin_turn(PinOperator, bpy.types.Operator):
             return self.refuse(error)
         sessions.live[source.session_uid].keeps_shape = True
         pins.entry_of(empty).hold_turn = True
+        select_alone(context, empty)
         return bpy.ops.transform.rotate("INVOKE_DEFAULT") and {"FINISHED"}
 
 

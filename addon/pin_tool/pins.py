@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..blender import modifier_kinds, modifier_stack, object_references
+from ..blender import modifier_kinds, modifier_stack, object_references, selection
 from ..blender.language import translated
 from ..blender.object_references import owner_of, settings_of
 from ..blender.property_definitions import listeners
@@ -15,7 +15,7 @@ from ..core.geometry.handles import box_matrix
 from ..core.geometry.spaces import inverse
 from ..core.runtime import jobs
 from ..field_modifier import layers, motion
-from ..handles import empties, naming
+from ..handles import empties, movers, naming
 from ..live import sessions
 from ..results import placement, visibility
 from . import places
@@ -59,10 +59,18 @@ def handles_in_view(context):
 
 
 def chosen(context):
-    """The active object if it is selected and a handle's Empty; else None."""
+    """The Empty of the chosen handle: the active object, or the active row of an active source; else None."""
     active = context.view_layer.objects.active
-    is_handle = active is not None and active.type == "EMPTY" and active.select_get()
-    return active if is_handle and entry_of(active) is not None else None
+    if active is None or not active.select_get():
+        return None
+    if active.type == "EMPTY":
+        return active if entry_of(active) is not None else None
+    handles, row = settings_of(active).handles, settings_of(active).active_handle
+    if not object_references.is_source(active) or not 0 <= row < len(handles):
+        return None
+    entry = handles[row]
+    is_empty = entry.kind != "BONE" and movers.has_mover(entry)
+    return entry.empty if is_empty and entry.empty.visible_get() else None
 
 
 def entry_of(empty):
@@ -104,9 +112,11 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
     now[:3, :3], now[:3, 3], rest[:3, 3] = place.turn, place.now, place.rest
     empty = empties.make_empty(context, source, Matrix(now.tolist()), radius, name(source, place.weights))
     entry = empties.add(source, empty, kind)
-    entry.rest = (inverse(empties.matrix_of(source)) @ box_matrix(rest, radius)).ravel()
+    entry.rest = (
+        movers.box_in_source(entry) @ inverse(box_matrix(now, radius)) @ box_matrix(rest, radius)
+    ).ravel()
     entry.anchor = anchor
-    select(context, empty)
+    choose(context, empty)
     return entry
 
 
@@ -148,24 +158,24 @@ def name(source, weights):
     return naming.numbered(source, "PIN")
 
 
-def select(context, empty):
-    """Selects this Empty alone and makes its row active; returns whether that changed anything."""
+def choose(context, empty):
+    """Makes the Empty's row the active one, and its object active and selected, alone unless it was active;
+    returns whether that changed anything."""
     layer, source = context.view_layer, owner_of(empty)
-    index = empties.find(source, empty)
-    others = [item for item in context.selected_objects if item != empty]
-    is_new = layer.objects.active != empty or not empty.select_get() or bool(others)
-    for item in others:
-        item.select_set(False)
-    empty.select_set(True)
-    layer.objects.active = empty
+    index, is_new = empties.find(source, empty), False
+    shown = source if source.visible_get() else empty  # the shape may be another object's
+    if layer.objects.active != shown or not shown.select_get():
+        selection.select_alone(context, shown)
+        is_new = True
     if settings_of(source).active_handle != index:
-        settings_of(source).active_handle = index
+        selection.choose_row(settings_of(source), index)
+        is_new = True
     return is_new
 
 
 def discard(source, empty):
     empties.remove(source, empties.find(source, empty))
-    bpy.data.objects.remove(empty)
+    empties.delete(empty)
 
 
 def remove(context, source, empty):
@@ -175,7 +185,7 @@ def remove(context, source, empty):
     if left:
         with_empties = [entry for entry in left if entry.kind != "BONE"]
         if with_empties:
-            select(context, with_empties[-1].empty)
+            choose(context, with_empties[-1].empty)
         return
     settings_of(source).hold_far = settings_of(source).keep_rest = False
     sessions.end(context, source)

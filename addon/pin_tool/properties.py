@@ -3,13 +3,15 @@
 
 import bpy
 
-from ..blender.property_definitions import collection, flag, integer
+from ..blender.property_definitions import choice, collection, flag, integer
+from ..core.settings.choices import TASKS
 from ..poses.properties import ARAPFIELDS_PG_pose
 
 
 class ARAPFIELDS_PG_scene(bpy.types.PropertyGroup):
     poses: collection(ARAPFIELDS_PG_pose, "Poses", "Fields that are kept with the file")
     active_pose: integer("Active Pose", "Row chosen in the list of poses", options={"SKIP_SAVE"})
+    task: choice(TASKS, "Task", "Which sections the panel shows")
     pin_radius: integer(
         "Radius",
         "Radius of the region that a new pin holds, on the screen",

@@ -19,15 +19,20 @@ class ARAPFIELDS_TOOL_pin(bpy.types.WorkSpaceTool):
     bl_idname = TOOL
     bl_label = "ARAP Pin"
     bl_description = (
-        "Pin the surface and drag it: the shape follows, as rigid as it can be. "
+        "Pin the active object and drag it: the shape follows, as rigid as it can be. "
         "Shift-click: anchor. Ctrl-click or X: delete. R or the ring: turn. F: radius. "
-        "Ctrl-wheel in a drag: reach"
+        "Ctrl-wheel in a drag: reach. Alt-click: pin another object"
     )
     bl_icon = ICON
     bl_cursor = "CROSSHAIR"
     bl_keymap = (
         (Op.PIN_HOVER, {"type": "MOUSEMOVE", "value": "ANY", "any": True}, None),
         (Op.PIN_DRAG, {"type": "LEFTMOUSE", "value": "PRESS"}, None),
+        (
+            Op.PIN_DRAG,
+            {"type": "LEFTMOUSE", "value": "PRESS", "alt": True},
+            {"properties": [("other", True)]},
+        ),
         # Beside the mesh, where Blender's own drag would move what is selected.
         ("view3d.select_box", {"type": "LEFTMOUSE", "value": "CLICK_DRAG"}, None),
         (Op.PIN_ANCHOR, {"type": "LEFTMOUSE", "value": "PRESS", "shift": True}, None),

@@ -13,6 +13,7 @@ class ARAPFIELDS_UL_poses(bpy.types.UIList):
 class ARAPFIELDS_PT_poses(Section, bpy.types.Panel):
     bl_label = "Poses"
     bl_order = 9
+    tasks = frozenset({"RIG"})
     bl_options = {"DEFAULT_CLOSED"}
 
     def fill(self, context, source, settings):

@@ -11,7 +11,7 @@ from . import rig as rigs
 class ARAPFIELDS_PT_skin(Section, bpy.types.Panel):
     bl_label = "Skin"
     bl_order = 5
-    bl_options = {"DEFAULT_CLOSED"}
+    tasks = frozenset({"RIG"})
     needs_source = False
 
     @classmethod
@@ -33,6 +33,7 @@ class ARAPFIELDS_PT_skin(Section, bpy.types.Panel):
 class ARAPFIELDS_PT_skin_settings(Advanced, bpy.types.Panel):
     bl_label = "Skin Settings"
     bl_order = 4
+    tasks = frozenset({"RIG"})
     needs_source = False
 
     @classmethod

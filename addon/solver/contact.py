@@ -9,7 +9,7 @@ import numpy as np
 
 from ..blender import mesh_arrays
 from ..blender.actions import has_keys
-from ..blender.evaluation import depsgraph_of, world_matrix
+from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import in_scene, settings_of
 from ..blender.property_definitions import from_single_precision
 from ..core.errors import UserError
@@ -194,14 +194,16 @@ def contact_of(source, settings, space, depsgraph):
     return ContactTerm(key, solids, height, up, group.itself)
 
 
-def for_job(context, source, fast):
-    """The ContactTerm of a job; UserError if contact is empty, or on without the method Fast."""
+def for_job(context, source, fast, space):
+    """The ContactTerm of a job in its solve space.
+
+    UserError if contact is empty, or on without the method Fast.
+    """
     reason = refusal(source)
     if reason is None and settings_of(source).contact.use and not fast:
         reason = UserError("{name}: Contact needs the method Fast, without Exact Handles", source)
     if reason is not None:
         raise reason
-    space = space_of(world_matrix(source), source.name)
     return contact_of(source, settings_of(source), space, depsgraph_of(context))
 
 

@@ -15,6 +15,7 @@ from ..surface.points_before import PointsBefore
 from .contact import native_contact
 from .request import Request
 from .setup import at_samples
+from .stylization import stylization
 
 REST_STEPS, FINE_TOLERANCE = 400, 1e-6  # of a solve from rest: to convergence
 STYLE = presets("live").get("STYLE")  # preset for styles: label, tip, options
@@ -163,23 +164,40 @@ class FrameSolver:
     def solve_from_rest(self, request, task=None):
         """The request's shape, independent of earlier solves: the same bits on any thread."""
         self.apply_request(request, task)  # before reset(): obstacles then start in place
+        if request.style is not None and request.motion is None:
+            return replace(self._stylized_shape(request, task), of=request)
         self.solver.reset()
         self.follow(request, iterations=REST_STEPS, tolerance=FINE_TOLERANCE, task=task)
         return replace(self.exact_shape(request), of=request)
 
+    def _stylized_shape(self, request, task):
+        """The request's shape as Stylize has it."""
+        setup, topology = self.sampled.setup, self.sampled.topology
+        weights = {name: weight for name, weight in request.energy.items() if name != "handle_weight"}
+        values = {**weights, "strength": request.style.strength, "sharpness": request.style.sharpness}
+        handles = [moved_to(handle, at) for handle, at in zip(request.handles, request.targets, strict=True)]
+        _, directions, *_, up = request.style
+        further = handles, setup.region, request.contact, setup.machine
+        styled = stylization(values, directions, up, *further)
+        field = styled.field(setup.surface, self.sampled.samples, task, self.distances)
+        moved = field(self.rest, triangles=self.rest_triangles)
+        triangles = self.rest_triangles if topology is None else topology.corners
+        return self._shape(request, styled.finished(setup.surface, self.rest, triangles, moved, task), field)
+
     def tracked_shape(self, request):
         """The request's shape as the solver tracks it, in single precision."""
-        return self._shape(request, None if self.moves_splats else self.solver.tracked())
+        return self._shape(request, None if self.moves_splats else self.solver.tracked(), self.solver.field)
 
     def exact_shape(self, request):
         """The request's shape, evaluated from the field."""
-        return self._shape(request, self.solver.field(self.rest, triangles=self.rest_triangles))
+        field = self.solver.field
+        return self._shape(request, field(self.rest, triangles=self.rest_triangles), field)
 
-    def _shape(self, request, solved):
+    def _shape(self, request, solved, field):
         surface, topology = self.sampled.setup.surface, self.sampled.topology
         needs_field = request.carried or surface.has_free_normals or surface.splats is not None
         needs_field = needs_field or self.before.needs_field
-        moved = self.solver.field if needs_field else None
+        moved = field if needs_field else None
         further = {"before": self.before} if topology is None else {}
         samples = self.sampled.samples
         carried = self.carrying.moved(native.library(), samples, moved, request.carried, **further)
@@ -205,6 +223,14 @@ class FrameSolver:
     def to_local(self, points):
         """(n, 3) from solve space to local coordinates, in single precision."""
         return in_single(self.sampled.setup.surface.space.to_local(require_finite(points)))
+
+
+def moved_to(handle, target):
+    """A handle at another target: (4, 4), or (3,) for a point."""
+    if handle.kind == "POINT":
+        place, target = target, handle.rest.copy()
+        target[:3, 3] = place
+    return replace(handle, target=target)
 
 
 def require_finite(points):

@@ -15,7 +15,7 @@ from ..core.settings.styles import STYLIZE
 from ..surface.source_surface import SourceSurface
 
 SAMPLES = 6000
-# Panel options that are weights of energy terms.
+# Panel options that are weights of energy terms, and whether a style is finished on the mesh.
 ENERGY = {
     "bending",
     "bending_unit",
@@ -24,6 +24,7 @@ ENERGY = {
     "symmetry",
     "rigidity",
     "keep_stance",
+    "finish",
     "locality",
 }
 
@@ -42,6 +43,8 @@ class SolverSetup:
     masses: np.ndarray | None = None  # each vertex's share of secondary motion
     start: int = 1  # frame at which secondary motion begins
     fps: float = 24.0
+    samples: int | None = None  # of the surface; None: SAMPLES
+    seed: int = 0  # of their choice
 
 
 @dataclass(frozen=True)
@@ -56,9 +59,10 @@ class SampledSource:
     topology: Topology | None = None
 
 
-def sampled(setup, count=None, seed=0):
-    """The SampledSource of a setup, of SAMPLES unless a count is given; on a worker."""
-    count = SAMPLES if count is None else count
+def sampled(setup, count=None, seed=None):
+    """The SampledSource of a setup, of its own samples unless a count and a seed are given; on a worker."""
+    count = count or setup.samples or SAMPLES
+    seed = setup.seed if seed is None else seed
     surface, tracker = setup.surface, ProgressTracker(native.library().Task)
     moves_points = setup.cells is None
     samples = surface.samples(tracker, count, seed, own_triangles=surface.exact and moves_points)

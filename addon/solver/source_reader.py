@@ -15,7 +15,7 @@ from ..carried.carrying import Carrying, Reshaped
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of, unflattened
 from ..core.runtime import native
-from ..handles import empties, movers
+from ..handles import empties, movers, symmetry
 from ..handles.properties import UNKNOWN_FRAME
 from ..surface.source_surface import read_surface
 from . import secondary_motion, style_settings
@@ -45,7 +45,7 @@ class SourceReader:
         context.view_layer.update()
         self.reference, self.kind = ObjectReference(source), kind
         self.carrying = Carrying(context, source)
-        space = space_of(place_of(source), source.name)
+        space = solve_space(source, place_of(source), kind)
         self.surface, is_at_hand = read_at_rest(
             context, source, kind, in_place, carrying=self.carrying, space=space
         )
@@ -63,7 +63,7 @@ class SourceReader:
             held = style_settings.group_names(source, settings_of(source).stylize)
         else:
             held = empties.group_names(source)
-        soft, region = secondary_motion.group_names(source), None
+        soft, region, further = secondary_motion.group_names(source), None, {}
         weights = yield from vertex_groups.read_weights(context, source, [*held, *soft], in_place)
         source = self.reference.get()
         settings = settings_of(source)
@@ -71,6 +71,7 @@ class SourceReader:
             self.read_handles(source, weights)
         if self.kind == "STYLIZE":
             region = style_settings.region_weights(context, source, settings.stylize, weights, in_place)
+            further = {"samples": settings.stylize.samples, "seed": settings.stylize.seed}  # as the operator
         self.setup = SolverSetup(
             kind=self.kind,
             surface=self.surface,
@@ -82,6 +83,7 @@ class SourceReader:
             masses=weights[soft[0]] if soft else None,
             start=settings.secondary.start,
             fps=secondary_motion.frame_rate(context.scene),
+            **further,
         )
 
     def read_handles(self, source, weights=None):
@@ -113,7 +115,7 @@ class SourceReader:
         settings, space, targets = settings_of(seen), space_of(where(source), source.name), []
         space = space.as_at(self.surface.space)
         if self.handles:
-            current = empties.solve_handles(source, space, where=where)
+            current = empties.solve_handles(source, space, where=where, rendered=rendered)
             if len(current) != len(self.handles):
                 raise SourceChanged(source.name)
             targets = [h.target[:3, 3] if h.kind == "POINT" else h.target for h in current]
@@ -128,6 +130,11 @@ class SourceReader:
             secondary_motion.motion_of(settings, space),
             contact_of(source, settings, space, rendered or depsgraph_of(context)),
         )
+
+
+def solve_space(source, world, kind):
+    """The solve space of a source with that world matrix; a style ignores symmetry."""
+    return symmetry.space_for(source, world) if kind == "DEFORM" else space_of(world, source.name)
 
 
 def place_of(item, bone="", rendered=None):

@@ -9,6 +9,7 @@ from . import painted
 class ARAPFIELDS_PT_stiffness(Advanced, bpy.types.Panel):
     bl_label = "Painted Stiffness"
     bl_order = 4
+    tasks = frozenset({"POSE"})
 
     def fill(self, context, source, settings):
         layout, group = self.layout, settings.stiffness

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender import vertex_groups
 from ..blender.evaluation import world_matrix
 from ..blender.host import has_window
-from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_values
@@ -15,11 +13,10 @@ from ..core.settings.parameters import is_fast
 from ..core.settings.styles import STYLIZE
 from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles import empties
-from ..handles.native_handles import native_handles
 from ..properties.choices import orientation, result_properties, style
 from ..solver import style_settings
-from ..solver.contact import for_job, native_contact
-from .finish import Finish
+from ..solver.contact import for_job
+from ..solver.stylization import stylization
 
 
 class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
@@ -50,35 +47,22 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         settings = settings_of(source).stylize
         values = effective_values(STYLIZE, settings, self)
         af = native.library()
-        options = options_of("stylize", values)
         space = space_of(world_matrix(source), source.name)
         style = style_settings.requested_style(settings, space, self)
         handles = empties.solve_handles(source, space, of_groups) if settings.use_handles else []
         weights = style_settings.region_weights(context, source, settings, of_groups, self.in_place(source))
-
-        contact = for_job(context, source, is_fast(values, STYLIZE))
+        contact = for_job(context, source, is_fast(values, STYLIZE), space)
+        styled = stylization(values, style.directions(af), style.up, handles, weights, contact)
 
         def solve(tracker, rest, samples, weight):
-            blend = (
-                None if weights is None else vertex_groups.at_points(rest.vertices, weights, samples.points)
-            )
-            return af.stylize(
-                samples,
-                style.directions(af),
-                options,
-                weights=blend,
-                up=style.up,
-                handles=native_handles(af, handles, rest, samples, reaches=False),
-                contact=native_contact(contact),
-                task=tracker.start("Stylizing", weight),
-            )
+            return styled.field(rest, samples, tracker.start("Stylizing", weight))
 
-        finish = None
-        if values["finish"] and contact is None:
-            shared = {name: values[name] for name in ("strength", "sharpness", "rigidity")}
-            finish = Finish(style, options_of("sharpen", shared), handles, weights)
+        def finish(tracker, *of_mesh):
+            return styled.finished(*of_mesh, tracker.start("Finishing", 1.0))
+
         counted = values["samples"], values["seed"]
-        return plan_solve_job(context, self, source, "STYLIZE", *counted, solve, finish=finish)
+        further = {} if styled.finish is None else {"finish": finish}
+        return plan_solve_job(context, self, source, "STYLIZE", *counted, solve, **further)
 
 
 class ARAPFIELDS_OT_set_style(SourceOperator, bpy.types.Operator):

@@ -50,6 +50,7 @@ class ARAPFIELDS_MT_styles(bpy.types.Menu):
 class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
     bl_label = "Stylize"
     bl_order = 3
+    tasks = frozenset({"STYLE"})
 
     def draw_header_preset(self, context):
         presets(self.layout, "stylize")
@@ -71,6 +72,7 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
 class ARAPFIELDS_PT_stylize_settings(Advanced, bpy.types.Panel):
     bl_label = "Stylize Settings"
     bl_order = 2
+    tasks = frozenset({"STYLE"})
 
     def fill(self, context, source, settings):
         layout, style = self.layout, settings.stylize

@@ -5,9 +5,16 @@ import bpy
 
 from ..blender import mesh_arrays, object_references
 from ..blender.language import translated
-from ..blender.point_data import face_count, points_of
-from ..blender.section import Advanced, Section, draw_settings, job_button, presets, settings_column, wrapped
-from ..blender.splat_layouts import holds_splats
+from ..blender.section import (
+    Advanced,
+    Section,
+    draw_settings,
+    job_button,
+    presets,
+    settings_column,
+    tasks_of,
+    wrapped,
+)
 from ..blender.user_preferences import fit_cache
 from ..core.runtime import native
 from ..core.settings.parameters import FIT
@@ -22,26 +29,22 @@ class ARAPFIELDS_PT_source(Section, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return True
+        return bool(cls.reason(context))
+
+    @staticmethod
+    def reason(context):
+        """Why nothing can be done with what is active; "" if something can."""
+        if native.problem():
+            return translated(native.problem())
+        source = object_references.source_of(context)
+        if source is None:
+            return "" if tasks_of(context) else translated("Select a mesh object")
+        error = object_references.refusal(source) or mesh_arrays.refusal(source)
+        return "" if error is None else translated(error)
 
     def fill(self, context, source, settings):
-        layout = self.layout
-        if native.problem():
-            wrapped(layout, translated(native.problem()), icon="ERROR")
-            return
-        if source is None:
-            layout.label(text="Select a mesh object", icon="INFO")
-            return
-        mesh = source.data
-        counts = {"vertices": f"{len(points_of(mesh)):,}", "faces": f"{face_count(mesh):,}"}
-        if holds_splats(source):
-            text = translated("{count} splats", count=counts["vertices"])
-        else:
-            text = translated("{vertices} vertices, {faces} faces", **counts)
-        wrapped(layout, f"{source.name}: {text}", icon="MESH_DATA")
-        reason = object_references.refusal(source) or mesh_arrays.refusal(source)
-        if reason:
-            wrapped(layout, translated(reason), icon="ERROR")
+        icon = "INFO" if source is None and not native.problem() else "ERROR"
+        wrapped(self.layout, ARAPFIELDS_PT_source.reason(context), icon=icon)
 
 
 class ARAPFIELDS_PT_advanced(Section, bpy.types.Panel):

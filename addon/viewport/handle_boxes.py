@@ -52,14 +52,21 @@ def shown_handles(source):
 
 def segments(source, across=FLAT):
     """((r, g, b), width, line ends in world space) of all handles of a source."""
-    lines = []
+    lines, chosen = [], chosen_of(source)
     for entry, rest, now in shown_handles(source):
-        is_chosen = entry.kind == "BONE" or entry.empty.select_get()
+        is_chosen = entry.kind == "BONE" or entry.empty.select_get() or entry == chosen
         parts = outline(entry.kind, rest, now, CHOSEN if is_chosen else THICK)
         if is_chosen and entry.reach > 0:
             parts.append((THIN, reach_lines(source, entry, rest, across)))
         lines += [(tuple(entry.colour), width, ends) for width, ends in parts]
     return lines
+
+
+def chosen_of(source):
+    """The handle in the active row of an active source, or None."""
+    handles, row = settings_of(source).handles, settings_of(source).active_handle
+    is_active = bpy.context.view_layer.objects.active == source
+    return handles[row] if is_active and 0 <= row < len(handles) else None
 
 
 def outline(kind, rest, now, thick):

@@ -11,7 +11,7 @@ from ..blender import mesh_arrays
 from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import facing, inverse, transform
-from ..handles.empties import make_empty, matrix_of
+from ..handles.empties import delete, make_empty, matrix_of
 from ..handles.palette import free_colour
 from ..pin_tool import places
 
@@ -104,9 +104,6 @@ def empty_at(context, owner, where, name):
     size = SIZE * float(np.linalg.norm(np.ptp(corners, axis=0))) or 1.0
     empty = make_empty(context, owner, Matrix.Translation(where.tolist()), size, name)
     empty.empty_display_type, empty.show_in_front = "SPHERE", True
-    matrix = empty.matrix_world.copy()
-    empty.parent = owner
-    empty.matrix_world = matrix
     return empty
 
 
@@ -131,7 +128,7 @@ def remove(source, index):
     entries = settings_of(source).wrap.landmarks
     for item in (entries[index].rest, entries[index].on_target):
         if item is not None:
-            bpy.data.objects.remove(item)
+            delete(item)
     entries.remove(index)
 
 

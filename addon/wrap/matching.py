@@ -8,7 +8,7 @@ import numpy as np
 from ..blender import mesh_arrays, modifier_kinds, modifier_stack
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError
-from ..core.geometry.spaces import is_in_place, transform
+from ..core.geometry.spaces import is_in_place, mirrors, transform
 from ..core.runtime import native
 from ..handles.empties import matrix_of
 from ..names import NEUTRAL_KEY
@@ -54,6 +54,7 @@ class Wrapped:
         source, target = (end.find() for end in self.ends)
         wrap = settings_of(source).wrap
         wrap.shown_keys, wrap.target_mark = self.shown_keys, self.mark if wrap.onto == target else ""
+        wrap.beside_target = beside(source, target).ravel() if wrap.onto == target else np.zeros(16)
 
 
 def beside(source, target):
@@ -72,11 +73,14 @@ class Match:
     def __init__(self, context, source, target, with_keys):
         self.ends = ObjectReference(source), ObjectReference(target)
         self.given = Given(context, source)
-        self.moved = self.moved_beside(source, target)
-        self.mirror = self.given.mirror(beside(source, target))
+        self.place_at(beside(source, target))
+        self.mirror = self.given.mirror(self.placement)
         self.triangles, self.mark = mesh_arrays.triangles(target.data), mark_of(target)
         wrap = settings_of(source).wrap
         self.is_edited = target == wrap.onto and wrap.target_mark not in ("", self.mark)
+        kept = np.array(wrap.beside_target, dtype=np.float64).reshape(4, 4)
+        is_known = target == wrap.onto and kept.any() and mirrors(kept) == mirrors(self.placement)
+        self.kept = kept if is_known else None  # where it lay when it was wrapped
         self.unposed, self.posed = (seen(context, source, target, is_posed) for is_posed in (False, True))
         self.offsets = keys.offsets(source) if with_keys else None
 
@@ -85,7 +89,16 @@ class Match:
         with_keys = self.offsets is not None
         task = tracker.start("Comparing", 0.3 if with_keys else 1.0)
         wrapped = native.library().MeshSdf(self.moved, self.given.triangles)
+        if self.kept is not None and self.met(wrapped) is None:
+            self.place_at(self.kept)
+            wrapped = native.library().MeshSdf(self.moved, self.given.triangles)
         self.own = self.met(wrapped)
+        if self.own is None:
+            raise UserError(
+                "{name} does not lie on {target}; move it back, or wrap again",
+                self.ends[0],
+                target=self.ends[1].name,
+            )
         tracker.warnings += self.off(wrapped) if self.is_edited else []
         self.places = self.places_of(self.own, self.triangles, task)
         self.displacements = self.carried(tracker.start("Shape Keys", 1.0)) if with_keys else None
@@ -93,7 +106,8 @@ class Match:
     def get(self):
         """The source and the target; UserError if one has changed since it was read."""
         source, target = (end.get() for end in self.ends)
-        is_there = is_in_place(self.moved_beside(source, target), self.moved)
+        now = self.placement if self.is_aside else beside(source, target)
+        is_there = is_in_place(transform(now, self.given.moved), self.moved)
         has_same_keys = self.offsets is None or np.array_equal(keys.offsets(source), self.offsets)
         if not (is_there and has_same_keys):
             raise UserError("{name} changed while it was worked on; run again", source)
@@ -101,24 +115,25 @@ class Match:
             raise UserError("{name} changed while it was worked on; run again", target)
         return source, target
 
-    def moved_beside(self, source, target):
-        """(n, 3) vertices of the wrapped source in the target's local coordinates."""
-        return transform(beside(source, target), self.given.moved)
+    @property
+    def is_aside(self):
+        """Whether the wrapped source was moved off its target since."""
+        return self.placement is self.kept
+
+    def place_at(self, placement):
+        """Places the wrapped source by (4, 4), from its local coordinates to the target's."""
+        self.placement, self.moved = placement, transform(placement, self.given.moved)
 
     def met(self, wrapped):
         """The target's vertices at the time of the wrap: unposed or posed, whichever is nearer.
 
-        UserError if most vertices of the wrapped source and of the target are far from each other.
+        None if most vertices of the wrapped source and of the target are far from each other.
         """
         distances = [distance(vertices, wrapped) for vertices in (self.unposed, self.posed)]
         own = self.unposed if distances[0] <= distances[1] else self.posed
         far = FAR * np.linalg.norm(np.ptp(own, axis=0))
         if min(distances) > far and distance(self.moved, native.library().MeshSdf(own, self.triangles)) > far:
-            raise UserError(
-                "{name} does not lie on {target}; move it back, or wrap again",
-                self.ends[0],
-                target=self.ends[1].name,
-            )
+            return None
         return own
 
     def off(self, wrapped):

@@ -30,7 +30,7 @@ class ARAPFIELDS_UL_landmarks(bpy.types.UIList):
 class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
     bl_label = "Wrap"
     bl_order = 4
-    bl_options = {"DEFAULT_CLOSED"}
+    tasks = frozenset({"WRAP"})
 
     def draw_header_preset(self, context):
         presets(self.layout, "wrap")
@@ -82,6 +82,7 @@ def factor_slider(layout, source):
 class ARAPFIELDS_PT_wrap_settings(Advanced, bpy.types.Panel):
     bl_label = "Wrap Settings"
     bl_order = 3
+    tasks = frozenset({"WRAP"})
 
     def fill(self, context, source, settings):
         settings_column(self.layout, settings.wrap, WRAP, advanced=True)

@@ -113,6 +113,11 @@ class ARAPFIELDS_PG_wrap(bpy.types.PropertyGroup):
         "transfer": carried_kinds(),
         "groups": groups(),
         "mix": mix(),
+        "beside_target": bpy.props.FloatVectorProperty(
+            size=16,
+            name="Place beside the Target",
+            description="From the object's coordinates to the target's at the wrap; zeros: not known",
+        ),
         "target_mark": text("Target's Mark", "What tells whether the target is as it was wrapped onto"),
         "shown_keys": text("Shown Keys", "Values of the shape keys that the wrap was made with, as JSON"),
         **annotations(WRAP),

@@ -69,11 +69,22 @@ class Transfer:
             "ARMATURE": self.armature,
             "CARRIED": self.carried,
         }
+        if self.match.is_aside:
+            kinds = self.without_objects(kinds)
         done = {label: steps[kind]() for kind, label, _ in TRANSFERRED if kind in kinds}
         if self.match.displacements is not None:
             keys.take_back(self.source, self.target)
             rigs.copy_drivers(self.source, self.target)
         return done
+
+    def without_objects(self, kinds):
+        """These kinds but for those that copy objects, which have places in the world."""
+        if settings_of(self.source).carried or settings_of(self.source).under_rig:
+            names = {"name": self.source.name, "target": self.target.name}
+            self.notes.append(
+                translated("armature and carried objects are copied where {name} lies on {target}", **names)
+            )
+        return [kind for kind in kinds if kind not in ("ARMATURE", "CARRIED")]
 
     def keys(self):
         displacements = self.match.displacements

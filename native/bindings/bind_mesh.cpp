@@ -75,11 +75,11 @@ py::tuple state_of(const py::object& self) {
   if (s.mesh) mesh = py::make_tuple(s.mesh->vertices, s.mesh->triangles);
   return py::make_tuple(s.points, s.normals, s.frame, s.weights, s.bend_weights,
                         py::array_t<std::int32_t>(py::array(py::cast(s.mesh_indices))), mesh,
-                        self.attr("__dict__"));
+                        self.attr("__dict__"), s.sheet_sizes);
 }
 
 std::pair<SurfaceSamples, py::dict> samples_of_state(const py::tuple& parts) {
-  const PickledState state(parts, "SurfaceSamples", 8);
+  const PickledState state(parts, "SurfaceSamples", 9);
   SurfaceSamples samples;
   samples.points = state.points(0);
   const Index count = samples.size();
@@ -102,6 +102,8 @@ std::pair<SurfaceSamples, py::dict> samples_of_state(const py::tuple& parts) {
     validate(*mesh);
     samples.mesh = std::move(mesh);
   }
+  samples.sheet_sizes = state.vector(8);
+  require_weights(state.name(8), samples.sheet_sizes, count);
   require(py::isinstance<py::dict>(state[7]), state.name(7), "got " + type_text(state[7]),
           "a dict is needed");
   return {std::move(samples), py::reinterpret_borrow<py::dict>(state[7])};

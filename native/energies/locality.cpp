@@ -22,7 +22,8 @@ class LocalityTerm final : public JetTermOf<LocalityTerm> {
     const Mat4& motion = locality_.motion;
     places_ = PointsInBoth((batch.points * motion.topLeftCorner<3, 3>().transpose()).rowwise() +
                            motion.topRightCorner<3, 1>().transpose());
-    Vector shares = batch.weights.size() > 0 ? batch.weights : Vector::Ones(batch.points.rows());
+    Vector shares = Vector::Ones(batch.points.rows());
+    if (batch.weights.size() > 0) shares = batch.weights.cwiseMin(1.0);
     if (locality_.shares.size() > 0)
       for (Index i = 0; i < shares.size(); ++i) {
         const Index row = batch.rows.empty() ? i : batch.rows[static_cast<std::size_t>(i)];

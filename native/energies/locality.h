@@ -25,10 +25,10 @@ struct Locality {
 };
 
 /// w · mean s c (1 − exp(−ρ/c)) with ρ = √(‖f(x) − m(x)‖² + ε²) − ε and the samples' shares s times their
-/// weights. It grows linearly from rest, so that most samples do not move at all, and ends at w c, so that it
-/// does not hold back what has to go far. After Chen, Zheng & Wampler, "Local Deformation for Interactive
-/// Shape Editing" (SIGGRAPH 2023), whose ℓ1 norm is clamped. Samples that are drawn anew have the share 1, or
-/// 0 where `shares` are given.
+/// weights, of which more than 1 counts as 1: what is stiffer is not held back more. It grows linearly from
+/// rest, so that most samples do not move at all, and ends at w c, so that it does not hold back what has to
+/// go far. After Chen, Zheng & Wampler, "Local Deformation for Interactive Shape Editing" (SIGGRAPH 2023),
+/// whose ℓ1 norm is clamped. Samples that are drawn anew have the share 1, or 0 where `shares` are given.
 std::shared_ptr<JetTerm> locality_term(Locality locality);
 
 }  // namespace arapfields

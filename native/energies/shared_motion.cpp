@@ -68,7 +68,7 @@ Mat4 motion_of(const std::vector<const Places*>& some, int axis) {
 
 }  // namespace
 
-Mat4 shared_motion(const BoundHandles& handles, int axis) {
+Mat4 shared_motion(const BoundHandles& handles, Index samples, int axis) {
   const std::vector<Places> every = places_of(handles);
   double weight = 0.0, held = 0.0;
   std::vector<const Places*> all;
@@ -78,7 +78,8 @@ Mat4 shared_motion(const BoundHandles& handles, int axis) {
     held += places.held;
     all.push_back(&places);
   }
-  if (every.size() == 1) return motion_of(all, axis);
+  if (every.size() == 1)
+    return 2 * handles.sources().rows() > samples ? motion_of(all, axis) : Mat4(Mat4::Identity());
   const auto is_shared = [&](const Mat4& motion) {
     double of_weight = 0.0, of_held = 0.0;
     for (const Places& places : every)

@@ -16,6 +16,8 @@ namespace {
 
 /// Height, as a fraction of the figure's, below which samples are on the ground, and their weight.
 constexpr double ground_height = 0.05, ground_weight = 128.0;
+/// Samples at least, where there are as many, whose mean says where a figure is.
+constexpr Index anchoring_samples = 500;
 
 /// lean_weight · Σ‖a‖² · ‖ω − (ω·up) up‖² of samples with arms a (n,3) about their mean, ω being the
 /// infinitesimal rotation closest to their displacements (n,3); and half its cotangents are arms · slope.
@@ -57,6 +59,21 @@ Stance Stance::of(PointsIn points, const Vec3& upwards) {
   const double square = (points.rowwise() - middle).rowwise().squaredNorm().mean();
   if (square > 0.0) stance.scale = 1.0 / square;
   return stance;
+}
+
+Points anchor_places(const Vec3& lowest, PointsIn samples) {
+  const Index stride = std::max<Index>(1, samples.rows() / anchoring_samples);
+  Points places(1 + (samples.rows() + stride - 1) / stride, 3);
+  places.row(0) = lowest.transpose();
+  for (Index i = 1; i < places.rows(); ++i) places.row(i) = samples.row((i - 1) * stride);
+  return places;
+}
+
+Vec3 anchoring_shift(PointsIn places, PointsIn values, const Vec3& up) {
+  const Vec3 direction = up.normalized();
+  const Points motion = places - values;
+  const Vec3 mean = motion.bottomRows(motion.rows() - 1).colwise().mean().transpose();
+  return mean + (motion.row(0).dot(direction) - mean.dot(direction)) * direction;
 }
 
 Stance Stance::at(const std::vector<Index>& rows) const {

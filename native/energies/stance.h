@@ -34,6 +34,13 @@ ARAPFIELDS_EXPORT_TO_TESTS double stance_energy(JetView<const Scalar> jets, Cons
                                                 const Stance& stance, double weight,
                                                 JetView<Scalar> cotangents);
 
+/// Where a translation of a figure without handles is measured: its lowest point, then some of its samples.
+Points anchor_places(const Vec3& lowest, PointsIn samples);
+
+/// The translation that gives the first of these places (n,3) its height along `up` back, and the others'
+/// mean its place across it, from their values (n,3).
+Vec3 anchoring_shift(PointsIn places, PointsIn values, const Vec3& up);
+
 /// weight · stance_energy() of a batch of the samples; fresh ones are not on the ground.
 std::shared_ptr<JetTerm> stance_term(Stance stance, double weight);
 

@@ -2,6 +2,7 @@
 #include "energies/style.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/errors.h"
 #include "energies/composed_energies.h"
@@ -18,6 +19,10 @@ constexpr double target_factor = 3.0;
 constexpr double usual_sharpness = 5.0, widest = 0.8;
 /// Distance of unit vectors that count as equal: the precision of meshes in text files.
 constexpr double same = 1e-4;
+
+/// How far a surface moves grows with the logarithm of its style's weight: of the way at the whole weight, by
+/// log(1 + (g − 1) share) / log g with this g, the mean of what figures do in various styles.
+constexpr double weight_growth = 70.0;
 
 class StyleTerm final : public JetTermOf<StyleTerm> {
  public:
@@ -88,6 +93,12 @@ Tensor StyleTerm::compose(const Tensor& jets, const EnergyTables& tables, Tensor
 }
 
 }  // namespace
+
+double StyleAtSamples::share(double strength) const {
+  if (strength >= 1.0) return strength;
+  const double growth = weight_growth * (preference ? preference->balance : 1.0);
+  return (std::pow(growth, strength) - 1.0) / (growth - 1.0);
+}
 
 StyleAtSamples StyleAtSamples::of(const Style& style, PointsIn normals, double sharpness) {
   StyleAtSamples result;

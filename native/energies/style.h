@@ -27,6 +27,10 @@ struct StyleAtSamples {
   Vector weights;                             ///< (n) weight of the style at each sample
   double factor = 1.0;                        ///< of the style's weight
 
+  /// The weight of the style at this strength, relative to its whole one: so that half of the strength moves
+  /// a surface by half of the way, for which a ninth of the weight is enough. Above 1, the strength itself.
+  double share(double strength) const;
+
   /// At samples with these rest normals (n,3). An object's map is smoothed less the larger the sharpness is;
   /// 0 stands for 5. Throws InvalidInput as gauss_preference() does.
   static StyleAtSamples of(const Style& style, PointsIn normals, double sharpness);

@@ -16,7 +16,8 @@ namespace {
 constexpr double below_own_face = 1e-7;
 
 /// Points on one sheet see each other around its bends if they are nearer than so many of their depths, their
-/// normals are alike (least cosine), and the ways to the place between them are free, halved so often.
+/// normals are alike or opposite (least cosine), and the ways to the place between them are free, halved so
+/// often.
 constexpr double near_depths = 20.0, one_sheet_cosine = 0.3;
 constexpr int most_bends = 2;
 
@@ -66,7 +67,7 @@ std::vector<bool> InsideSight::see(const Eyes& from, const Eyes& to, const Pairs
   for (std::size_t k = 0; k < pairs.size() && bends > 0; ++k) {
     const auto& [i, j] = pairs[k];
     const double near = near_depths * std::max(from.depths[i], to.depths[j]);
-    if (!result[k] && from.normals.row(i).dot(to.normals.row(j)) > one_sheet_cosine &&
+    if (!result[k] && std::abs(from.normals.row(i).dot(to.normals.row(j))) > one_sheet_cosine &&
         (from.places.row(i) - to.places.row(j)).squaredNorm() < near * near)
       bent.push_back(k);
   }

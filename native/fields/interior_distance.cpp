@@ -19,6 +19,10 @@ namespace {
 constexpr double overlap_share = 0.25;
 /// Neighbours on one sheet: largest distance, in spacings, and least cosine of the normals.
 constexpr double sheet_spacings = 2.5, sheet_cosine = 0.3;
+/// Largest cosine of the normals on both sides of a thin part.
+constexpr double opposite_cosine = -0.5;
+/// InnerBallRules: least_cosine, for the widths of thin parts.
+constexpr double thin_cosine = 0.2;
 
 }  // namespace
 
@@ -28,6 +32,16 @@ InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing, c
   const Vector radii = inner_radii(nodes, normals, nodes, normals, {.most = extent});
   const Points centers = nodes - radii.asDiagonal() * normals;
   const double near = sheet_spacings * spacing;
+  const Vector thin = inner_radii(nodes, normals, nodes, normals,
+                                  {.most = extent, .least_cosine = thin_cosine, .near = near});
+  // Whether two nodes lie opposite each other on a part thinner than the spacing, with no other part between:
+  // in the mean of both planes' distances the part's curvature cancels.
+  const auto are_opposite = [&](Index i, Index j) {
+    const double width = 2.0 * std::max(thin[i], thin[j]);
+    if (width > spacing || normals.row(i).dot(normals.row(j)) > opposite_cosine) return false;
+    const double apart = 0.5 * (nodes.row(i) - nodes.row(j)).dot(normals.row(i) - normals.row(j));
+    return apart > 0.0 && apart < (1.0 + overlap_share) * width;
+  };
   parallel_for(0, nodes.rows(), 32, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i)
       for (Index j = 0; j < nodes.rows(); ++j) {
@@ -36,7 +50,8 @@ InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing, c
         const double larger = std::max(radii[i], radii[j]), smaller = std::min(radii[i], radii[j]);
         const double limit = larger + overlap_share * smaller;
         if (((centers.row(i) - centers.row(j)).squaredNorm() < limit * limit ||
-             (square < near * near && normals.row(i).dot(normals.row(j)) > sheet_cosine)) &&
+             (square < near * near &&
+              (normals.row(i).dot(normals.row(j)) > sheet_cosine || are_opposite(i, j)))) &&
             (!may_join || may_join(i, j)))
           edges_[i].push_back({static_cast<std::int32_t>(j), static_cast<float>(std::sqrt(square))});
       }

@@ -16,8 +16,8 @@ using MayJoin = std::function<bool(Index, Index)>;
 /// A graph on samples of a surface, whose shortest paths approximate distances through the inside of the
 /// shape. Each node has the largest ball that touches the surface there from inside and contains no other
 /// node (its centre approximates the medial axis); two nodes are joined if one's ball nearly contains the
-/// other's centre, or if they are neighbours on one sheet. Connected components are joined by a minimum
-/// spanning tree.
+/// other's centre, or if they are neighbours on one sheet, or on both sides of a part thinner than the
+/// spacing. Connected components are joined by a minimum spanning tree.
 class InteriorGraph {
  public:
   struct Edge {

@@ -16,6 +16,8 @@ namespace {
 /// A patch is closed but for small holes if the square of its boundary's length is below this share of its
 /// area: 6.3 for half a sphere, .5 for a sphere without a cap of a fifth of its diameter.
 constexpr double small_holes = 1.0;
+/// A patch is a sheet if that ratio is above this one: 12.6 for a disc, the least of all flat sheets.
+constexpr double long_boundary = 8.0;
 /// A closed patch that encloses less than this share of a cube of its area is as flat as rounding.
 constexpr double flat = 1e-9;
 /// Vertices of a patch that tell whether it lies inside another one.
@@ -125,7 +127,7 @@ void decide(const TriangleMesh& mesh, std::vector<Patch>& patches) {
 
 }  // namespace
 
-Triangles outward_triangles(const TriangleMesh& mesh) {
+Triangles outward_triangles(const TriangleMesh& mesh, Vector* sheet_sizes) {
   validate(mesh);
   const std::vector<std::int32_t> first = first_at_position(mesh.vertices);
   const Index count = mesh.triangles.rows();
@@ -204,6 +206,12 @@ Triangles outward_triangles(const TriangleMesh& mesh) {
     if (std::abs(patch.volume) < flat * std::pow(patch.area, 1.5)) patch.volume = 0.0;
   }
   decide(mesh, patches);
+  if (sheet_sizes != nullptr) {
+    sheet_sizes->setZero(count);
+    for (const Patch& patch : patches)
+      if (patch.boundary * patch.boundary > long_boundary * patch.area)
+        for (const std::int32_t t : patch.triangles) (*sheet_sizes)[t] = std::sqrt(patch.area);
+  }
 
   Triangles result = mesh.triangles;
   for (std::int32_t t = 0; t < count; ++t)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "core/types.h"
 #include "mesh/triangle_mesh.h"
 
 namespace arapfields {
@@ -10,7 +11,9 @@ namespace arapfields {
 /// then encloses a positive volume. One inside another closed patch, such as the wall of a cavity or an
 /// eyeball, is turned as that one is. A patch with small holes counts as closed; one that is open, such as a
 /// sheet, faces where most of it faced. Vertices at one position count as one.
-Triangles outward_triangles(const TriangleMesh& mesh);
+/// `sheet_sizes`: is given for each triangle (m) the square root of its patch's area where the patch is a
+/// sheet, with a boundary that is long for its area; 0 elsewhere.
+Triangles outward_triangles(const TriangleMesh& mesh, Vector* sheet_sizes = nullptr);
 /// The mesh with these triangles. Both throw InvalidInput as validate() does.
 TriangleMesh facing_outwards(const TriangleMesh& mesh);
 

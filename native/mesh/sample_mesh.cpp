@@ -35,6 +35,7 @@ struct Joined {
   VertexWeights painted;
   Frame frame;
   std::vector<Index> ends;  // of each mesh's triangles; empty for a single mesh
+  Vector sheet_sizes = {};  // of the triangles, in mesh units; empty: there are no open sheets
 };
 
 /// Painted weights at drawn points; none where all are 1, so that they cost and change nothing.
@@ -62,7 +63,8 @@ SurfaceSamples draw_from(Joined joined, Index count, std::uint64_t seed, bool wh
   samples.normals.resize(count, 3);
   const bool several = !joined.ends.empty();
   const bool painted = joined.painted.weights.size() > 0 || joined.painted.bend_weights.size() > 0;
-  std::vector<AreaSampler::Draw> draws(several || painted ? count : 0);
+  const bool sheets = joined.sheet_sizes.size() > 0;
+  std::vector<AreaSampler::Draw> draws(several || painted || sheets ? count : 0);
   parallel_for(0, count, grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       Random random(seed, static_cast<std::uint64_t>(i));
@@ -88,6 +90,11 @@ SurfaceSamples draw_from(Joined joined, Index count, std::uint64_t seed, bool wh
   for (Index i = 0; i < count && several; ++i) {
     const auto mesh_end = std::upper_bound(joined.ends.begin(), joined.ends.end(), draws[i].triangle);
     samples.mesh_indices.push_back(static_cast<std::int32_t>(mesh_end - joined.ends.begin()));
+  }
+  if (sheets) {
+    samples.sheet_sizes.resize(count);
+    for (Index i = 0; i < count; ++i)
+      samples.sheet_sizes[i] = joined.sheet_sizes[draws[i].triangle] / joined.frame.scale;
   }
   const auto kept = std::make_shared<const Joined>(std::move(joined));
   samples.mesh = {kept, &kept->mesh};
@@ -212,7 +219,10 @@ SurfaceSamples sample_mesh(PointsIn vertices, TrianglesIn triangles, Index count
   require_weights("weights", painted.weights, vertices.rows());
   require_weights("bend_weights", painted.bend_weights, vertices.rows());
   const Frame frame = area_frame(vertices, triangles);
-  return draw_from({facing_outwards({vertices, triangles}), painted, frame, {}}, count, seed, true);
+  Joined joined{{vertices, {}}, painted, frame, {}};
+  joined.mesh.triangles = outward_triangles({vertices, triangles}, &joined.sheet_sizes);
+  if (!(joined.sheet_sizes.array() > 0.0).any()) joined.sheet_sizes.resize(0);
+  return draw_from(std::move(joined), count, seed, true);
 }
 
 SurfaceSamples sample_meshes(const std::vector<TriangleMesh>& meshes, Index count, std::uint64_t seed,
@@ -243,12 +253,15 @@ SurfaceSamples sample_meshes(const std::vector<TriangleMesh>& meshes, Index coun
   all.mesh.vertices.resize(vertices, 3);
   all.mesh.triangles.resize(triangles, 3);
   all.painted = {Vector::Ones(painted.empty() ? 0 : vertices), Vector::Ones(painted.empty() ? 0 : vertices)};
+  all.sheet_sizes.resize(triangles);
   Index v = 0, t = 0;
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     const TriangleMesh& mesh = meshes[i];
     all.mesh.vertices.middleRows(v, mesh.vertices.rows()) = mesh.vertices;
+    Vector sheet_sizes;
     all.mesh.triangles.middleRows(t, mesh.triangles.rows()) =
-        outward_triangles(mesh).array() + static_cast<int>(v);
+        outward_triangles(mesh, &sheet_sizes).array() + static_cast<int>(v);
+    all.sheet_sizes.segment(t, mesh.triangles.rows()) = sheet_sizes;
     if (!painted.empty()) {
       if (painted[i].weights.size() > 0)
         all.painted.weights.segment(v, mesh.vertices.rows()) = painted[i].weights;
@@ -258,6 +271,7 @@ SurfaceSamples sample_meshes(const std::vector<TriangleMesh>& meshes, Index coun
     v += mesh.vertices.rows();
     t += mesh.triangles.rows();
   }
+  if (!(all.sheet_sizes.array() > 0.0).any()) all.sheet_sizes.resize(0);
   return draw_from(std::move(all), count, seed, true);
 }
 

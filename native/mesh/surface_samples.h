@@ -20,9 +20,12 @@ struct SurfaceSamples {
   /// Draws `count` other samples of the same surface, in the same frame; empty where the surface is not
   /// known.
   std::function<SurfaceSamples(Index count, std::uint64_t seed)> redraw;
-  Vector weights = {};                            ///< (n; empty: all 1) ≥ 0, factors of the samples' energies
-  Vector bend_weights = {};                       ///< (n; empty: all 1) ≥ 0, factors of the bending in them
-  std::vector<std::int32_t> mesh_indices = {};    ///< (n; empty: all 0) which of several meshes each lies on
+  Vector weights = {};                          ///< (n; empty: all 1) ≥ 0, factors of the samples' energies
+  Vector bend_weights = {};                     ///< (n; empty: all 1) ≥ 0, factors of the bending in them
+  std::vector<std::int32_t> mesh_indices = {};  ///< (n; empty: all 0) which of several meshes each lies on
+  /// (n; empty: all 0) square root of the area of the open sheet that each lies on, in cube units; 0: on no
+  /// sheet.
+  Vector sheet_sizes = {};
   std::shared_ptr<const TriangleMesh> mesh = {};  ///< that they lie on, in mesh coordinates; null: not known
   Index size() const { return points.rows(); }
 };

@@ -15,6 +15,8 @@ namespace {
 constexpr Index most_nodes = 1500, most_witnesses = 6000;
 /// The limits, as fractions of the radius of gyration.
 constexpr double most_share = 0.6, least_share = 0.02;
+/// The most of an open sheet, as a fraction of the square root of its area.
+constexpr double sheet_share = 0.03;
 /// Distance, as a fraction of a ball's radius, by which a point may be outside of it.
 constexpr double overlap_share = 0.25;
 /// InnerBallRules: least_cosine, and `near` in spacings of the witnesses.
@@ -24,7 +26,8 @@ constexpr double smooth_share = 0.5, blend_spacings = 1.0;
 
 }  // namespace
 
-LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::vector<std::uint32_t>& order) {
+LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::vector<std::uint32_t>& order,
+                               const Vector& sheet_sizes) {
   const bool extended = (samples.rowwise() - samples.row(0)).cwiseAbs().maxCoeff() > 0.0;
   const double gyration =
       extended ? Frame::balanced(samples, Vector::Ones(samples.rows()), {}, 1.0).scale : 1.0;
@@ -39,11 +42,17 @@ LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::ve
   const double side = 3.5 * gyration;
   spacing_ = side / std::sqrt(static_cast<double>(nodes_.rows()));
   const double witness_spacing = side / std::sqrt(static_cast<double>(witnesses.rows()));
-  const Vector radii =
+  Vector radii =
       inner_radii(nodes_, node_normals, witnesses, witness_normals,
                   {.most = most_, .least_cosine = least_cosine, .near = facing_spacings * witness_spacing});
-  const Points centers = nodes_ - radii.asDiagonal() * node_normals;
   const Index n = nodes_.rows();
+  sheets_.assign(static_cast<std::size_t>(n), false);
+  for (Index i = 0; i < n && sheet_sizes.size() > 0; ++i)
+    if (const double size = sheet_sizes[chosen[static_cast<std::size_t>(i)]]; size > 0.0) {
+      sheets_[i] = true;
+      radii[i] = std::min(radii[i], sheet_share * size);
+    }
+  const Points centers = nodes_ - radii.asDiagonal() * node_normals;
   Vector thickness(n);
   const double least = least_share * gyration;
   parallel_for(0, n, 32, [&](Index first, Index last) {
@@ -51,7 +60,8 @@ LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::ve
       double largest = std::max(least, radii[i]);
       for (Index j = 0; j < n; ++j) {
         const double limit = (1.0 + overlap_share) * radii[j];
-        if (radii[j] > largest && (centers.row(j) - nodes_.row(i)).squaredNorm() <= limit * limit)
+        if (radii[j] > largest && sheets_[i] == sheets_[j] &&
+            (centers.row(j) - nodes_.row(i)).squaredNorm() <= limit * limit)
           largest = radii[j];
       }
       thickness[i] = largest;
@@ -64,7 +74,7 @@ LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::ve
       double sum = 0.0, total = 0.0;
       for (Index j = 0; j < n; ++j) {
         const double square = (nodes_.row(j) - nodes_.row(i)).squaredNorm();
-        if (square >= width * width) continue;
+        if (square >= width * width || sheets_[i] != sheets_[j]) continue;
         const double weight = 1.0 - square / (width * width);
         if (weight > 0.0) sum += weight * thickness[j], total += weight;
       }
@@ -89,10 +99,11 @@ Vector LocalThickness::at(PointsIn points) const {
       squares.head(n).array() = (nodes.col(0) - points(i, 0)).square() +
                                 (nodes.col(1) - points(i, 1)).square() +
                                 (nodes.col(2) - points(i, 2)).square();
-      const double nearest = squares.minCoeff(), farthest = nearest + width * width;
+      Index own = 0;  // the point's kind is that of the node nearest to it
+      const double nearest = squares.minCoeff(&own), farthest = nearest + width * width;
       double sum = 0.0, total = 0.0;
       for (Index j = 0; j < n; ++j)
-        if (squares[j] < farthest) {
+        if (squares[j] < farthest && sheets_[j] == sheets_[own]) {
           const double weight = 1.0 - (squares[j] - nearest) / (width * width);
           sum += weight * values_[j], total += weight;
         }

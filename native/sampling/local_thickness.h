@@ -12,12 +12,15 @@ namespace arapfields {
 /// ball inside the shape that (nearly) contains the point, averaged over neighbours (half of Hildebrand and
 /// Rüegsegger 1997, "A new method for the model-independent assessment of thickness"). It is clamped to
 /// between 0.02 and 0.6 of the radius of gyration. The upper limit also holds where no opposite side bounds a
-/// ball, as on open sheets and where normals point inwards.
+/// ball, as where normals point inwards. Open sheets have at most the thickness of leather of their size:
+/// 0.03 of the square root of their area.
 class LocalThickness {
  public:
   /// From samples (n,3) of a surface and their outward unit normals (n,3); without normals it is the upper
-  /// limit everywhere. `order` is a spatially coherent permutation of the samples.
-  LocalThickness(PointsIn samples, PointsIn normals, const std::vector<std::uint32_t>& order);
+  /// limit everywhere. `order` is a spatially coherent permutation of the samples, `sheet_sizes` (n; empty:
+  /// all 0) the square root of the area of the open sheet that each lies on, 0 on no sheet.
+  LocalThickness(PointsIn samples, PointsIn normals, const std::vector<std::uint32_t>& order,
+                 const Vector& sheet_sizes = {});
 
   /// At points (m,3) of the surface.
   Vector at(PointsIn points) const;
@@ -26,7 +29,8 @@ class LocalThickness {
 
  private:
   Points nodes_;
-  Vector values_;  // at nodes
+  Vector values_;             // at nodes
+  std::vector<bool> sheets_;  // whether nodes lie on open sheets
   double spacing_ = 0.0, most_ = 0.0, median_ = 0.0;
 };
 

@@ -9,6 +9,9 @@
 
 namespace arapfields {
 
+/// As StylizeOptions::centers, enough for a field whose result sharpen() finishes.
+inline constexpr int centers_before_sharpen = 500;
+
 /// Brings a mesh that a field has stylized nearer to its style, by its own vertices: (n,3) of `moved`,
 /// sharpened. In turns, each vertex gets the rotation that fits its edges best, each triangle loses what its
 /// edges have along the preferred normal nearest to its own (of an object's style: its target), where that is

@@ -11,7 +11,7 @@ namespace {
 
 /// Groups that a factor solves for.
 constexpr Index coarsest_size = 1500;
-/// Weight that binds a node to its place, relative to its diagonal.
+/// Weight that binds a node to its place weakly, relative to its diagonal.
 constexpr double binding = 1e-7;
 constexpr int most_iterations = 12;
 constexpr Index laplacian_grain = 4096;
@@ -112,7 +112,8 @@ void add(double factor, const Points& b, Points& a) {
 }  // namespace
 
 SurfaceLaplacian::SurfaceLaplacian(const WeldedSurface& surface, const Vector& factors,
-                                   const std::vector<char>& held, const Progress& progress)
+                                   const std::vector<char>& held, const Progress& progress,
+                                   const Vector& bound)
     : held_(held) {
   Graph graph;
   graph.held = held;
@@ -139,7 +140,7 @@ SurfaceLaplacian::SurfaceLaplacian(const WeldedSurface& surface, const Vector& f
     }
     graph.first.push_back(static_cast<std::int32_t>(graph.neighbour.size()));
   }
-  bound_ = binding * graph.diagonal;
+  bound_ = bound.size() > 0 ? bound : Vector(binding * graph.diagonal);
   graph.diagonal += bound_;
   first_ = graph.first, neighbour_ = graph.neighbour, weight_ = graph.weight, diagonal_ = graph.diagonal;
   inverse_diagonal_ = diagonal_.cwiseInverse();

@@ -10,15 +10,16 @@
 namespace arapfields {
 
 /// The constant system of a surface's global steps: Σ of its triangles' edges w (x_i − x_j)², a weight for
-/// each triangle times its cotangents, with some nodes held, and all others bound weakly to their places.
+/// each triangle times its cotangents, with some nodes held, and all others bound to places of theirs.
 /// Conjugate gradients solve it from the last positions on. They are preconditioned by groups of nodes at
 /// several scales (Bramble, Pasciak and Xu 1990, "Parallel Multilevel Preconditioners"), of which a sparse
 /// Cholesky factor solves the coarsest: the factor of all nodes takes minutes for half a million of them.
 class SurfaceLaplacian {
  public:
-  /// `factors` (m') of the triangles; `held` (k) 1 for nodes that stay.
+  /// `factors` (m') of the triangles; `held` (k) 1 for nodes that stay; `bound` (k) weights that bind nodes
+  /// to their places, or empty: weak ones.
   SurfaceLaplacian(const WeldedSurface& surface, const Vector& factors, const std::vector<char>& held,
-                   const Progress& progress);
+                   const Progress& progress, const Vector& bound = {});
 
   /// Moves x (k,3) towards the solution for the right-hand side (k,3) of the edges, until the residual is
   /// `tolerance` of that at the start; `places` (k,3) are those that nodes are bound to.

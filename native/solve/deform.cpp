@@ -2,6 +2,7 @@
 #include "solve/deform.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "core/parallel.h"
 #include "energies/shared_motion.h"
@@ -53,10 +54,14 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
   require_within_reach(terms.handles, samples.points);
   terms.pull = options.handles;
   terms.locality.options = options.locality;
-  terms.locality.motion = shared_motion(terms.handles);
-  if (terms.locality.acts())
-    terms.locality.shares =
-        held_shares(samples.points, samples.points, parts_of(samples.points), terms.handles.sources());
+  terms.locality.motion = shared_motion(terms.handles, samples.size());
+  if (terms.locality.acts()) {
+    std::vector<Index> rows(static_cast<std::size_t>(samples.size()));
+    std::iota(rows.begin(), rows.end(), Index{0});
+    const std::vector<Index> parts = parts_of(samples.points);
+    terms.locality.shares = locality_shares(samples.points, rows, terms.handles, terms.handles.sources(),
+                                            {samples.points, parts});
+  }
   terms.weights = energy_weights(samples, terms.handles);
   if (options.exact_handles) terms.pull.handle_weight = 0.0;
   return terms;

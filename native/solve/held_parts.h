@@ -7,9 +7,18 @@
 
 namespace arapfields {
 
-/// Which points (n,3) of a surface lie on a part of it that is held: 1 there, 0 on parts that nothing holds
-/// and that follow others; empty where the surface is one part. `parts` has the part of each of some sites
-/// (sampling/parts.h), `held` are places of handles; a place belongs to the part of the nearest site.
-Vector held_shares(PointsIn points, PointsIn sites, const std::vector<Index>& parts, PointsIn held);
+class BoundHandles;
+
+/// The parts of a surface: of each of some sites (sampling/parts.h); a place belongs to that of the nearest.
+struct SurfaceParts {
+  PointsIn sites;
+  const std::vector<Index>& parts;
+};
+
+/// Factors (n) of samples in the energy that holds them in place: 0 for those that a handle takes along, and
+/// on parts of the surface that hold none of the places `held` and follow others; 1 elsewhere. `rows` has
+/// their numbers among the samples of `handles`.
+Vector locality_shares(PointsIn points, const std::vector<Index>& rows, const BoundHandles& handles,
+                       PointsIn held, const SurfaceParts& surface);
 
 }  // namespace arapfields

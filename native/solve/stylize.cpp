@@ -32,11 +32,13 @@ Handle lowest_point(const SurfaceSamples& samples, const Vec3& up) {
   return handle;
 }
 
-/// Translates the field so that the handle's error is 0; no other term depends on translations.
-void anchor_lowest_point(TrainableField& field, const Handle& handle) {
-  Points value(1, 3);
-  field.evaluate(handle.rest_point.transpose(), {value.data(), 1, JetOrder::value});
-  field.translate(handle.rest_point - value.row(0).transpose());
+/// Translates the field so that the lowest point keeps its height, and the middle its place seen along `up`;
+/// no other term depends on translations.
+void anchor(TrainableField& field, const Vec3& lowest, PointsIn samples, const Vec3& up) {
+  const Points places = anchor_places(lowest, samples);
+  Points values(places.rows(), 3);
+  field.evaluate(places, {values.data(), places.rows(), JetOrder::value});
+  field.translate(anchoring_shift(places, values, up));
 }
 
 }  // namespace
@@ -60,7 +62,7 @@ Solution stylize(const SurfaceSamples& samples, const Style& style, const Styliz
   terms.barrier_threshold = options.surface.barrier_threshold;
   terms.style = StyleAtSamples::of(style, samples.normals, options.sharpness);
   if (!terms.style.idle(samples.normals))
-    terms.gauss = options.strength * options.gauss_weight * terms.style.factor;
+    terms.gauss = terms.style.share(options.strength) * options.gauss_weight * terms.style.factor;
   if (weights.size() > 0) terms.style.weights = terms.style.weights.cwiseProduct(weights);
   terms.external = hooks.energies;
   terms.further = hooks.terms;
@@ -82,7 +84,7 @@ Solution stylize(const SurfaceSamples& samples, const Style& style, const Styliz
   if (terms.gauss == 0.0 && handles.empty() && !hooks.adds_terms()) loop.training.iterations = 0;
   Solution solution = solve_field(field, samples, std::move(terms), loop, progress);
   if (handles.empty()) {
-    if (!hooks.adds_terms()) anchor_lowest_point(*field, lowest);
+    if (!hooks.adds_terms()) anchor(*field, lowest.rest_point, samples.points, up);
     solution.report.handle_mean.clear();
     solution.report.handle_max.clear();
   }

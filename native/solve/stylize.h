@@ -12,16 +12,16 @@
 namespace arapfields {
 
 /// Deforms a surface so that its normals turn to preferred ones, or to an object's, as rigidly as possible:
-///   strength·gauss_weight·style + rigidity·(stretch + bending·bend) + keep_stance·stance +
+///   share·gauss_weight·style + rigidity·(stretch + bending·bend) + keep_stance·stance +
 ///   handles,
-/// ñ the unit normals of the deformed surface, and style the mean of u(1 − g(ñ)), or of 3 u‖ñ − T(n)‖².
-/// (The paper's text has the sign of the first term reversed and leaves the normals without unit length,
-/// which a collapsing surface would win.) Without handles the lowest sample, against the direction `up`, is
-/// held in place; with handles, there is no stance. `weights` (one u ≥ 0 a sample, or empty) blend the
-/// effect. Strength 0 is the identity, and so is a sphere's style. External energies may depend on where the
-/// surface is: with them, a spring alone holds the lowest sample. An observer gets deform's terms, style and
-/// stance. Throws InvalidInput for bad options,
-/// samples without normals, weights or handles that do not fit; SolveDiverged; Cancelled.
+/// share that of the strength (StyleAtSamples), ñ the unit normals of the deformed surface, and style the
+/// mean of u(1 − g(ñ)), or of 3 u‖ñ − T(n)‖². (The paper's text has the sign of the first term reversed and
+/// leaves the normals without unit length, which a collapsing surface would win.) Without handles the lowest
+/// sample, against the direction `up`, keeps its height, and the middle its place across it; with handles,
+/// there is no stance. `weights` (one u ≥ 0 a sample, or empty) blend the effect. Strength 0 is the identity,
+/// and so is a sphere's style. External energies may depend on where the surface is: with them, a spring
+/// alone holds the lowest sample. An observer gets deform's terms, style and stance. Throws InvalidInput for
+/// bad options, samples without normals, weights or handles that do not fit; SolveDiverged; Cancelled.
 ARAPFIELDS_EXPORT Solution stylize(const SurfaceSamples& samples, const Style& style,
                                    const StylizeOptions& options, const Progress& progress = {},
                                    const Vector& weights = {}, const std::vector<Handle>& handles = {},

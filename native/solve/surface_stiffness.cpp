@@ -29,7 +29,7 @@ SurfaceStiffness::SurfaceStiffness(const SurfaceSamples& samples, const SurfaceO
     : SurfaceStiffness(nullptr, options) {
   if (bending_ > 0.0 && options.bending_unit == BendingUnit::thickness)
     thickness_ = std::make_shared<const LocalThickness>(samples.points, samples.normals,
-                                                        canonical_order(samples.points));
+                                                        canonical_order(samples.points), samples.sheet_sizes);
 }
 
 Vector energy_weights(const SurfaceSamples& samples, const BoundHandles& handles) {

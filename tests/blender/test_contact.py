@@ -14,8 +14,9 @@ if IN_BLENDER:
     from support.blender.panels import Layout
     from support.blender.stacks import local_points
 
+    from addon.core.geometry.spaces import space_of
     from addon.core.runtime import jobs
-    from addon.live import touching
+    from addon.live import sessions, touching
     from addon.pin_tool.tool import ARAPFIELDS_TOOL_pin
     from addon.solver import contact
 
@@ -54,6 +55,29 @@ def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
     assert crosses in [text for _, text in jobs.messages()]
 
 
+@pytest.mark.parametrize("rests", [False, True])
+def test_a_cancelled_move_of_an_obstacle_ends_in_the_shape_before(rests):
+    """Esc puts what was moved back: the shape before it is there at once, bit for bit, however long the move
+    has rested elsewhere."""
+    bar, block, _ = pressed()
+    scenes.activate(block, bar)
+    bpy.ops.arapfields.add_obstacle()
+    bar.arapfields.contact.use = True
+    assert bpy.ops.arapfields.live(kind="DEFORM") == {"FINISHED"}
+    lowest(bar)
+    before, height = local_points(bar), block.location.z
+    for lift in (0.1, 0.3):
+        block.location.z = height + lift
+        step(refined=rests)
+    assert np.abs(local_points(bar) - before).max() > 0.05
+    block.location.z = height
+    bpy.context.view_layer.update()
+    sessions.update(bpy.context)  # without waiting
+    assert np.array_equal(local_points(bar), before)
+    step(refined=True)
+    assert np.array_equal(local_points(bar), before)
+
+
 def test_what_cannot_be_an_obstacle_is_said():
     bar, block, _ = pressed()
     group = bar.arapfields.contact
@@ -61,7 +85,10 @@ def test_what_cannot_be_an_obstacle_is_said():
     group.use = True
     assert "neither" in str(contact.refusal(bar))
     group.itself = True
-    assert contact.refusal(bar) is None and contact.for_job(bpy.context, bar, fast=True).made().itself
+    assert (
+        contact.refusal(bar) is None
+        and contact.for_job(bpy.context, bar, True, space_of(bar.matrix_world)).made().itself
+    )
     group.itself = False
     bpy.ops.arapfields.add_obstacle()  # nothing else is selected
     entry = group.obstacle_list[0]
@@ -109,7 +136,7 @@ def test_a_method_that_heeds_no_contact_is_refused_by_name():
 
 
 def solids(bar):
-    return contact.for_job(bpy.context, bar, fast=True).solids
+    return contact.for_job(bpy.context, bar, True, space_of(bar.matrix_world)).solids
 
 
 def test_obstacles_are_read_as_they_are_shown():
@@ -135,7 +162,7 @@ def test_obstacles_are_read_as_they_are_shown():
         assert np.allclose(seen, scenes.world_points(block), atol=1e-4)
         a, b, c = (solid.vertices[solid.triangles[:, k]] for k in range(3))
         assert np.einsum("ij,ij->", a, np.cross(b, c)) > 0  # the triangles face outwards
-        contact.for_job(bpy.context, bar, fast=True).made(known)
+        contact.for_job(bpy.context, bar, True, space_of(bar.matrix_world)).made(known)
         keys.add(solid.key)
         functions += known.values()
     assert functions[0] is functions[1] and len(keys) == 2

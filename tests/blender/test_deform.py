@@ -203,10 +203,10 @@ def test_the_line_about_a_result_says_what_it_has_reached_and_no_name_twice():
         bpy.ops.arapfields.deform(**scenes.QUICK)
         level, line = jobs.messages()[0]
         assert level == "INFO" and line.startswith(begin) and line.count("Bar:") == 1, line
-        assert "follows its handles within" in line and "nothing folded" in line and "energy" not in line
+        assert "follows its handles within" in line and "no folds" in line and "energy" not in line
 
 
 @pytest.mark.parametrize("error, share", [(1e-9, "0.1%"), (0.0014, "0.1%"), (0.003, "0.2%"), (0.1, "5.0%")])
 def test_what_is_said_of_the_handles_is_a_bound(error, share):
     line = solve_job.describe("", {"handle_error_max": error, "flipped_share": 0.0}, 2.0)
-    assert line == f"follows its handles within {share}, nothing folded"
+    assert line == f"follows its handles within {share}, no folds"

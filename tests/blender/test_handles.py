@@ -34,7 +34,7 @@ def test_without_empties_one_is_made_at_the_cursor():
     bpy.ops.arapfields.add_handle()
     (entry,) = bar.arapfields.handles
     assert entry.empty.name == "Handle 1" and tuple(entry.empty.location) == (0.5, 0, 0)
-    assert entry.empty.users_collection == bar.users_collection and entry.inside > 0
+    assert entry.empty.parent == bar and entry.inside > 0
 
 
 def test_rest_follows_the_source_and_reset_returns_to_it():

@@ -49,6 +49,7 @@ def test_a_box_holds_what_is_seen_in_it(way):
     assert all(entry.inside > 8 for entry in cube.arapfields.handles)
     rest = scenes.world_points(cube)
     moving.location.x += 0.3
+    cube.arapfields.deform.locality = 0.0  # by which what is beside a corner of so coarse a cage rests
     if way == "deform":
         assert bpy.ops.arapfields.deform(field="radial", samples=2000) == {"FINISHED"}
     else:

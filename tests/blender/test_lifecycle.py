@@ -179,7 +179,7 @@ def test_in_a_window_drawing_and_timers_end_too():
 
 
 def test_what_failed_half_way_is_undone():
-    jobs.add_message("INFO", "Bar: nothing folded")
+    jobs.add_message("INFO", "Bar: no folds")
     addon.unregister()
     assert not jobs.messages()
     parts, lifecycle.PARTS = lifecycle.PARTS, (*lifecycle.PARTS, (lambda: 1 / 0, None))

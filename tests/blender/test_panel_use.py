@@ -25,8 +25,8 @@ def test_everyday_sections_come_first_and_numbers_are_under_advanced():
     jobs.board.messages.clear()
     panels = {name: getattr(bpy.types, name) for name in shown_texts if "_PT_" in name}
     first = {n: cls.bl_order for n, cls in panels.items() if not hasattr(cls, "bl_parent_id")}
-    folded = ["wrap", "skin", "carried", "secondary", "contact", "poses", "animation", "advanced"]
-    order = ["source", "handles", "deform", "stylize", *folded, "status"]
+    folded = ["carried", "contact", "poses", "animation", "advanced"]
+    order = ["tasks", "handles", "deform", "stylize", "wrap", "skin", *folded, "status"]
     assert sorted(first, key=first.get) == [f"ARAPFIELDS_PT_{name}" for name in order]
     closed = {name for name, cls in panels.items() if "DEFAULT_CLOSED" in getattr(cls, "bl_options", ())}
     assert closed == {*panels} - {*first} | {f"ARAPFIELDS_PT_{name}" for name in folded}

@@ -6,7 +6,8 @@ from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
-    from support.blender.panels import drawn, prepared
+    from support.blender import scenes
+    from support.blender.panels import drawn, each_task, prepared
 
     import addon.registration as registration
     from addon.core.runtime import jobs
@@ -37,9 +38,9 @@ EXPECTED = {
     "nothing": ("ARAPFIELDS_PT_source", "Select a mesh object"),
     "a camera": ("ARAPFIELDS_PT_source", "Select a mesh object"),
     "a mesh": ("ARAPFIELDS_PT_surface", "Not fitted yet"),
-    "modifiers and keys": ("ARAPFIELDS_PT_status", "Read before S"),
+    "modifiers and keys": ("ARAPFIELDS_PT_status", "Works before S"),
     "edit mode": ("ARAPFIELDS_PT_source", "Bar is in Edit Mode; leave it first"),
-    "a handle active": ("ARAPFIELDS_PT_source", "Bar"),
+    "a handle active": ("ARAPFIELDS_PT_tasks", "Bar"),
     "a deleted handle": ("ARAPFIELDS_PT_handles", "(deleted)"),
     "fitted": ("ARAPFIELDS_PT_surface", "Fit in the cache"),
     "fit cleared": ("ARAPFIELDS_PT_surface", "Fit was cleared"),
@@ -64,12 +65,29 @@ def test_the_panel_draws(state):
         assert shown == ["ARAPFIELDS_PT_source"]
     else:
         said = "ARAPFIELDS_PT_status" in shown
-        assert len(shown) == 18 + said and said == (
-            state in ("modifiers and keys", "fitted", "fit cleared", "running", "a failure")
-        )
+        hinders = "ARAPFIELDS_PT_source" in shown
+        assert len(shown) == 18 + said + hinders and hinders == (state == "edit mode")
+        assert said == (state in ("modifiers and keys", "fitted", "fit cleared", "running", "a failure"))
     if state in EXPECTED:
         section, text = EXPECTED[state]
         assert text in " ".join(texts_of[section]), texts_of[section]  # long texts take several labels
+
+
+def test_each_task_shows_its_few_sections():
+    scenes.bar_with_handles()
+    shown = {}
+    for task in each_task():
+        classes = [cls for module in registration.MODULES for cls in module.CLASSES]
+        panels = [c for c in classes if issubclass(c, bpy.types.Panel) and not hasattr(c, "bl_parent_id")]
+        shown[task] = {c.bl_label for c in panels if c.poll(bpy.context)}
+    always = {"Tasks", "Bake and Export", "Advanced"}
+    assert {task: names - always for task, names in shown.items()} == {
+        "POSE": {"Handles", "Deform", "Carried Objects", "Contact"},
+        "STYLE": {"Stylize", "Carried Objects", "Contact"},
+        "WRAP": {"Wrap", "Carried Objects"},
+        "RIG": {"Skin", "Poses"},
+    }
+    assert all(always <= names for names in shown.values())
 
 
 def test_every_grey_button_says_why():

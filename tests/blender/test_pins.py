@@ -33,14 +33,32 @@ def test_the_first_drag_bends_and_what_is_far_holds():
     assert np.abs(shift[rest[:, 0] < -0.8]).max() < 0.15  # without it everything would follow by 0.5
 
 
-def test_without_anything_that_holds_the_shape_follows_as_a_whole():
+@pytest.mark.parametrize("locality", [0.0, None])
+def test_without_anything_that_holds_the_shape_follows_as_a_whole(locality):
+    """Without locality at once, with it where the pin is pulled far."""
+    bar = scenes.bar()
+    if locality is not None:
+        bar.arapfields.deform.locality = locality
+    rest = scenes.world_points(bar)
+    empty = pin(bar, (1.0, 0.0, 0.25))
+    bar.arapfields.keep_rest = False
+    way = 0.5 if locality == 0 else 4.0
+    empty.location.z += way
+    step(refined=True)
+    off = np.abs(scenes.world_points(bar) - rest - [0, 0, way]).max()
+    assert off < (0.02 if locality == 0 else 0.5 * way)
+
+
+def test_a_pin_alone_takes_its_surroundings():
     bar = scenes.bar()
     rest = scenes.world_points(bar)
     empty = pin(bar, (1.0, 0.0, 0.25))
     bar.arapfields.keep_rest = False
-    empty.location.z += 0.5
+    empty.location.z += 0.1
     step(refined=True)
-    assert np.abs(scenes.world_points(bar) - rest - [0, 0, 0.5]).max() < 0.02
+    moved = scenes.world_points(bar) - rest
+    assert np.abs(moved[rest[:, 0] < -0.5]).max() < 0.01
+    assert np.abs(moved[rest[:, 0] > 0.95][:, 2] - 0.1).max() < 0.05
 
 
 def test_a_press_without_a_move_changes_no_shape():

@@ -1,28 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pin tool over what an object carries: a pin there would be the carrier's."""
 
-import types
-
 import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
-    from mathutils import Vector
     from support.blender import scenes
+    from support.blender.pins import from_above
 
     from addon.pin_tool import hover
 
 pytestmark = pytest.mark.in_blender
-
-
-def from_above(x, y=0.0):
-    """A view along -z at a place."""
-    matrix = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1.0]])
-    ray = Vector((x, y, 5)), Vector((0, 0, -1))
-    given = {"pixel": (200, 200), "perspective": matrix, "size": (400, 400), "scale": 1.0}
-    return types.SimpleNamespace(ray=lambda: ray, towards=Vector((0, 0, 1)), **given)
 
 
 def met(x):

@@ -3,14 +3,18 @@
 
 import bpy
 import stage
+from support.blender import panels
 
+from addon.blender.section import TASKS
 from addon.preferences import ARAPFIELDS_AP_preferences, show
 from addon.registration import CLASSES
+from addon.tasks.panel import ARAPFIELDS_PT_tasks
 
 PANEL, ADVANCED = "ARAPFIELDS_PT_", "ARAPFIELDS_PT_advanced"
-HEADER, STEP = (1120, 97), 28.4  # the sidebar's first header, and the distance of closed sections
+HEADER, STEP = (1120, 200), 28.4  # the first section below the tasks, and the distance of closed sections
 INNER = 26.0  # distance of closed sections in Advanced
-STYLES = (1150, 127)  # the menu of styles, if its section were the first
+OTHERS = {"stylize": "STYLE", "wrap": "WRAP", "skin": "RIG", "poses": "RIG"}  # tasks of sections but POSE
+STYLES = (1150, 230)  # the menu of styles, if its section were the first
 SIDEBAR = (1028, 84, 258, 820)  # left, top, width, height
 
 
@@ -33,23 +37,38 @@ def checks(figures, folder):
         view.language = "en_US"
         yield 1.0
     yield from preferences(folder, "preferences")
-    yield from open_alone({"source", "handles", "deform", "stylize"})
+    yield from open_alone({"handles", "deform"})
     bar.modifiers.clear()
     bar.arapfields.surface = "EXACT"
-    figures["sections"] = len(rows()) + len(rows(ADVANCED))
+    figures["sections"] = len({row for _ in panels.each_task() for row in (*rows(), *rows(ADVANCED))})
 
 
 def rows(parent=None):
     """The sections that are drawn, from top to bottom: all, or those within another."""
     with stage.override():
         shown = [c for c in CLASSES if c.__name__.startswith(PANEL) and c.poll(bpy.context)]
-    shown = [c for c in shown if getattr(c, "bl_parent_id", None) == parent]
+    shown = [c for c in shown if getattr(c, "bl_parent_id", None) == parent and c != ARAPFIELDS_PT_tasks]
     shown.sort(key=lambda c: c.bl_order)
     return [c.__name__[len(PANEL) :].replace("_", "-") for c in shown]
 
 
+def choose(task):
+    """Shows the sections of a task."""
+    bpy.context.scene.arapfields.task = task
+    for region in stage.view()[1].regions:
+        region.tag_redraw()
+    yield 1.0
+
+
 def sections(folder, name):
-    yield from open_alone(set())
+    for task in TASKS:
+        yield from choose(task)
+        yield from sections_of_task(folder, name if task == "POSE" else f"{name}-{task.lower()}")
+    yield from choose("POSE")
+
+
+def sections_of_task(folder, name):
+    yield from open_alone(set(), bpy.context.scene.arapfields.task)
     yield from picture(folder, f"{name}-closed")
     for row, section in enumerate(rows()):
         yield from press(row)
@@ -80,8 +99,12 @@ def within(folder, name, row):
         yield from press(row + 1, number)
 
 
-def open_alone(names):
-    """Opens these sections and closes all others; a click with Ctrl closes all but one."""
+def open_alone(names, task=None):
+    """Opens these sections of a task and closes its others; a click with Ctrl closes all but one.
+
+    `task`: by default the one that has these sections.
+    """
+    yield from choose(task or next((OTHERS[name] for name in names if name in OTHERS), "POSE"))
     for words in (("mousemove", *HEADER), ("keydown", "ctrl"), ("click", 1), ("keyup", "ctrl")):
         stage.tool(*words)
         yield 0.7

@@ -55,7 +55,7 @@ def checks(figures, folder):
     rest = scenes.world_points(suzanne)
     look()
     yield from stage.open_sidebar()
-    yield from picture(folder, "handles", {"source", "handles", "deform"})
+    yield from picture(folder, "handles", {"handles", "deform"})
     with stage.override():
         bpy.ops.arapfields.deform(output="WARP")
     deformed = scenes.world_points(suzanne)

@@ -16,7 +16,7 @@ from addon.core.runtime import jobs
 
 SCAN_AT = Vector((2.0, 0, 0))
 # Positions in the sidebar of a window of 1600 × 1000, with only Wrap open.
-EYEDROPPER, BUTTON, WRAP = (1263, 240), (1155, 286), (1155, 517)
+EYEDROPPER, BUTTON, WRAP = (1263, 229), (1155, 275), (1155, 506)
 SETTLED = 1.5  # seconds until the sidebar's sections have stopped moving
 
 

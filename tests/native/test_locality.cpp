@@ -48,7 +48,7 @@ template <class Make>
 Mat4 shared(Make&& make, const std::vector<Mat4>& motions, int axis = -1) {
   std::vector<Handle> handles;
   for (std::size_t i = 0; i < motions.size(); ++i) handles.push_back(make(places[i], motions[i]));
-  return shared_motion(BoundHandles(handles, grid()), axis);
+  return shared_motion(BoundHandles(handles, grid()), grid().rows(), axis);
 }
 
 void check(const Mat4& found, const Mat4& expected) { BOOST_TEST((found - expected).norm() < 1e-9); }
@@ -64,8 +64,15 @@ BOOST_AUTO_TEST_CASE(the_motion_that_most_handles_share) {
     check(shared(make, {whole, other, other, whole}), rest);
     check(shared(make, {whole, other}), rest);
   }
-  check(shared(&box, {whole}), whole);
-  check(shared(&pin, {turned(0.0, Vec3(0.1, 0.2, 0.3))}), turned(0.0, Vec3(0.1, 0.2, 0.3)));
+}
+
+BOOST_AUTO_TEST_CASE(a_handle_alone_moves_the_whole_if_it_holds_most_of_it) {
+  check(shared(&box, {whole}), rest);
+  check(shared(&pin, {whole}), rest);
+  Handle all = box(Vec3::Zero(), whole);
+  all.rest.diagonal() << 1.0, 1.0, 1.0, 1.0;
+  all.target = whole * all.rest;
+  check(shared_motion(BoundHandles({all}, grid()), grid().rows()), whole);
 }
 
 BOOST_AUTO_TEST_CASE(what_stays_is_where_the_rest_stays) {
@@ -87,7 +94,7 @@ BOOST_AUTO_TEST_CASE(two_pins_that_keep_their_distance_turn_nothing) {
 BOOST_AUTO_TEST_CASE(with_symmetry_it_is_symmetric) {
   Mat4 along = turned(0.0, Vec3(0.0, 0.1, 0.2)), across = turned(0.0, Vec3(0.3, 0.1, 0.2));
   check(shared(&box, {along, along}, 0), along);
-  check(shared(&box, {across}, 0), along);
+  check(shared(&box, {across, across}, 0), along);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 from support.geometry import meshes
+from support.geometry.bar import box
 from support.geometry.cases import bar_handles, bar_samples, moved, shift, turn
 from support.geometry.fork import BOTTOM, LEG, LEGS, TIP, fork_samples
 
@@ -12,7 +13,7 @@ import arapfields as af
 SIZE = 2 * LEG  # of the fork, about
 LESS = 0.15  # of its way without locality: how far the other leg moves
 RIGID = 1e-3  # of the size
-WEIGHT = 0.1
+WEIGHT = af.DeformOptions().locality
 DEFORM = dict(centers=300, locality=WEIGHT)
 MIDDLE = BOTTOM @ np.diag([0.2, 1, 1, 1])  # of the bend
 BENT = turn([1, 0, 0], 40, (0, 0, 0.3))
@@ -58,9 +59,30 @@ def test_one_motion_of_all_handles_carries_the_whole(samples, solve, far):
 
 
 @SOLVES
-def test_a_handle_alone_carries_the_whole(samples, solve):
-    field = solve(samples, [af.Point(LEGS[1][0], LEGS[1][0] + [0.4, 0.2, 0.1])])
-    assert np.abs(field(samples.points) - samples.points - [0.4, 0.2, 0.1]).max() < RIGID * SIZE
+@pytest.mark.parametrize("size", [0.05, 0.1])
+def test_a_pin_alone_takes_its_surroundings(samples, solve, size):
+    tip, way = LEGS[1][0], size * SIZE * np.array([0.2, 1.0, 0.1])
+    field = solve(samples, [af.Point(tip, tip + way)])
+    assert np.linalg.norm(field([tip]) - tip - way) < 0.05 * np.linalg.norm(way)
+    other = samples.points[(samples.points[:, 0] < -0.1) & (samples.points[:, 2] > 0.5 * LEG)]
+    assert np.linalg.norm(field(other) - other, axis=1).max() < 0.01 * SIZE
+
+
+@SOLVES
+def test_a_pin_pulled_far_takes_the_whole_along(samples, solve):
+    tip, way = LEGS[1][0], 0.5 * SIZE * np.array([0.2, 1.0, 0.1])
+    field = solve(samples, [af.Point(tip, tip + way)])
+    other = samples.points[samples.points[:, 0] < -0.1]
+    assert np.linalg.norm(field(other) - other, axis=1).min() > 0.2 * SIZE
+    assert np.linalg.det(field.jacobian(samples.points)).min() > 0
+
+
+@SOLVES
+def test_a_handle_of_nearly_all_carries_the_whole(samples, solve):
+    motion = turn([1, 2, 0], 20, (0, 0.2, 0.1)) @ shift([0.02, 0.1, 0])
+    field = solve(samples, [moved(box([0, 0, 0.5], [0.6, 0.6, 0.6]), motion)])
+    expected = samples.points @ motion[:3, :3].T + motion[:3, 3]
+    assert np.abs(field(samples.points) - expected).max() < RIGID * SIZE
 
 
 @SOLVES

@@ -186,7 +186,7 @@ def test_a_cube_as_an_object_looks_like_the_preset(data_dir):
     """The mean preference of the deformed normals, which says how cubic a shape is."""
     samples = af.sample_mesh(*read_mesh(data_dir / "meshes" / "bunny.off"), 8000, seed=1)
     cube = af.preferred_normals("cube")
-    for strength in (0.3, 1.0):
+    for strength in (0.7, 1.0):
         reached = []
         for style in ("cube", af.ObjectStyle(*meshes.box())):
             field = af.stylize(samples, style, af.StylizeOptions(strength=strength), up=(0, 1, 0))

@@ -3,7 +3,8 @@
 
 import numpy as np
 import pytest
-from support.geometry import cases, meshes
+import scipy.spatial
+from support.geometry import cases, meshes, sheets
 from support.oracles.network import Network
 from support.tolerances import ON_SURFACE
 
@@ -75,6 +76,7 @@ def test_bad_arguments_cancel_and_no_surface(bunny):
 # Samples straight from triangles, and samples that a caller brings.
 
 GYRATION = 0.6  # of a surface in its cube
+TIP_SPACINGS = 6.0  # of a vertex from the nearest sample at most, in the samples' mean spacing; seen 5.6
 
 
 def test_samples_lie_on_the_triangles_with_their_normals():
@@ -204,3 +206,20 @@ def test_more_points_than_memory_holds_are_refused():
     v, f = meshes.box()
     with pytest.raises(af.InvalidInput, match=r"count: this would take about .* GiB"):
         af.sample_mesh(v, f, count=10**12)
+
+
+@pytest.mark.parametrize("count", [20000, 2000])
+def test_tips_have_samples_near_them(count):
+    """Needles of next to no area, and vertices pulled out into spikes."""
+    v, f = meshes.sphere(subdivisions=4)
+    tips = np.random.default_rng(3).choice(len(v), 20, replace=False)
+    v[tips] *= 4.0
+    needle, g = meshes.box((1.5, 1e-5, 1e-5))
+    both, triangles = sheets.together((v, f), (needle + np.array([0, 0, 2.0]), g))
+    samples = af.sample_mesh(both, triangles, count=count)
+    corners = both[triangles]
+    area = 0.5 * np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    distances = scipy.spatial.cKDTree(samples.points).query(both)[0]
+    assert distances.max() < TIP_SPACINGS * np.sqrt(area.sum() / count)

@@ -29,10 +29,9 @@ def samples():
 
 
 def released(surface, angle=35.0, further=(), **options):
-    """A bar that was bent by so many degrees, and of which one end is let go."""
-    live = af.LiveDeformer(
-        surface, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], af.LiveOptions(**(QUICK | options))
-    )
+    """A bar that was bent by so many degrees without locality, and of which one end is let go."""
+    options = af.LiveOptions(**(QUICK | {"locality": 0} | options))
+    live = af.LiveDeformer(surface, [af.Cuboid(LEFT, LEFT), af.Cuboid(RIGHT, RIGHT)], options)
     live.solve([LEFT, turned(angle) @ RIGHT], iterations=300, tolerance=1e-6)
     live.set_handles([af.Cuboid(LEFT, LEFT)])
     live.set_secondary_motion(af.SecondaryMotionOptions(**({"damping": 0.0} | dict(further))))

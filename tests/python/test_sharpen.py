@@ -133,6 +133,20 @@ def test_held_vertices_stay_and_weights_scale_the_effect():
     )
 
 
+def test_details_stay():
+    """A button on a ball, .03 high: under a face of the cube it keeps most of its height."""
+    ball, triangles = sphere(1.0, 6)
+    away = np.arccos(np.clip(ball[:, 2], -1, 1)) / 0.08  # of the button's radius, from the pole
+    vertices = ball * (1 + 0.03 * np.clip(6 * (1 - away), 0, 1))[:, None]
+    sharpened = af.sharpen(vertices, triangles, vertices, "cube")
+    plain = af.sharpen(ball, triangles, ball, "cube")
+    assert np.abs(plain - ball).max() > 0.05
+    top, around = away < 0.5, (away > 1.2) & (away < 1.6)
+    height = sharpened[top, 2].mean() - sharpened[around, 2].mean()
+    flat = plain[top, 2].mean() - plain[around, 2].mean()
+    assert height - flat > 0.6 * 0.03
+
+
 def test_the_lowest_vertex_keeps_its_height():
     vertices, triangles = sphere(1.0, 4)
     up = np.array([0.0, 1.0, 0.0])

@@ -34,11 +34,11 @@ def test_a_plate_is_half_as_thick_as_its_sides_are_apart(share):
     assert np.abs(np.median(thickness) / share - 1) < SAMPLED
 
 
-def test_an_open_sheet_has_a_robust_size():
-    """Nothing bounds a ball below it: 0.6 of its radius of gyration."""
+def test_an_open_sheet_is_as_thick_as_leather_of_its_size():
+    """Nothing bounds a ball below it: 0.03 of the square root of its area."""
     v, f = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
     thickness = testing.thickness(samples_of(v, f))
-    assert np.allclose(thickness, 0.6 * np.sqrt(2 / 3), rtol=0.02)
+    assert np.allclose(thickness, 0.03 * 2.0, rtol=1e-9)
 
 
 def test_parts_have_their_own_thickness():

@@ -184,12 +184,13 @@ def fitted(callback=None, **changes):
 
 
 SURFACE = {"stretch", "bend", "barrier", "handles"}
+DEFORM = SURFACE | {"locality"}
 CALLS = {
     "fit": (fitted, {}, {"error"}),
-    "deform": (deformed, {}, SURFACE),
-    "deform_radial": (deformed, {"field": "radial", "barrier": 0.0}, SURFACE - {"barrier"}),
-    "deform_invertible": (deformed, {"invertibility": 1.0}, SURFACE | {"invertibility"}),
-    "deform_stiff": (deformed, {"bending": 0.0, "barrier": 0.0}, {"stretch", "handles"}),
+    "deform": (deformed, {}, DEFORM),
+    "deform_radial": (deformed, {"field": "radial", "barrier": 0.0}, DEFORM - {"barrier"}),
+    "deform_invertible": (deformed, {"invertibility": 1.0}, DEFORM | {"invertibility"}),
+    "deform_stiff": (deformed, {"bending": 0.0, "barrier": 0.0}, DEFORM - {"bend", "barrier"}),
     "stylize": (stylized, {}, SURFACE | {"style", "stance"}),
     "stylize_radial": (stylized, {"field": "radial", "rigidity": 2.0}, SURFACE | {"style", "stance"}),
 }

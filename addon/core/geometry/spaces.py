@@ -51,6 +51,12 @@ class Space:
         flip[axis, axis] = -1.0
         return self.solve_to_world @ flip @ self.world_to_solve
 
+    def shifted(self, axis, offset):
+        """This space with its origin moved by `offset` along an axis (0, 1, 2)."""
+        shift = np.eye(4)
+        shift[axis, 3] = offset
+        return Space(inverse(shift) @ self.local_to_solve, self.solve_to_world @ shift)
+
     def is_like(self, other, noise=SAME_STRETCH):
         """Whether another space has the same stretch (non-uniform scale)."""
         return np.allclose(self.local_to_solve, other.local_to_solve, rtol=0.0, atol=noise)

@@ -140,3 +140,10 @@ TRANSFERRED = (
     ),
     ("CARRIED", "Carried Objects", "A copy of each object that it carries, at its distance from the target"),
 )
+
+TASKS = [
+    ("POSE", "Pose", "Pins and handles that move the shape, what it carries, and what is in its way"),
+    ("STYLE", "Style", "Shapes as of cubes, or of any object"),
+    ("WRAP", "Wrap", "One mesh onto another"),
+    ("RIG", "Rig", "Weights of an armature, and stored poses"),
+]

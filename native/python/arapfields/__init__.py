@@ -7,6 +7,7 @@ Arrays are NumPy, all coordinates are the mesh's own; distances are negative ins
 from . import _loading as _loading  # first: the other modules import the native module
 from ._copying import register as _register_copies
 from ._native import (
+    CENTERS_BEFORE_SHARPEN,
     Attachment,
     Bone,
     Cancelled,
@@ -118,6 +119,7 @@ Region = RegionHandle
 InverseOptions = InverseTrainingOptions
 
 __all__ = [
+    "CENTERS_BEFORE_SHARPEN",
     "ArrayLike",
     "Attachment",
     "Bone",

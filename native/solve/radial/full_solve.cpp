@@ -39,6 +39,8 @@ constexpr int worth_a_first = 600, most_first = 500, first_steps = 20;
 /// or the energy to less than the fraction `least_slide`.
 constexpr int most_slides = 12, solves_a_slide = 5, steps_a_slide = 4;
 constexpr double least_slide = 0.99;
+/// Samples of a stylization's energy for each center, and the most.
+constexpr int style_samples_a_center = 8, most_style_samples = 8000;
 /// Centers, samples and iterations of the coarse solve that a stylization starts from.
 constexpr int style_first_centers = 400, style_first_samples = 4000, style_first_steps = 30;
 /// A styled field that folds between the energy samples is solved again, in rounds, with the folded samples
@@ -266,9 +268,9 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   // The solver's rigidity has weight 1: all other weights are divided by options.rigidity.
   LiveOptions live = live_options(options);
   live.locality.locality = 0.0;
-  live.samples = 8000;
-  live.coarse_centers = 200;
-  live.fine_centers = 1300;
+  live.samples = std::min(most_style_samples, style_samples_a_center * options.centers);
+  live.coarse_centers = 2 * options.centers / 13;
+  live.fine_centers = options.centers;
   live.fine_radius_factor = 3.0;
   live.tolerance = 1e-4;
   live.handle_weight = std::max(options.handles.handle_weight, 1e-3) / options.rigidity;
@@ -278,22 +280,26 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   live.interior = !handles.empty();  // a style alone acts everywhere alike
   const auto shape = std::make_shared<const RestShape>(
       samples, live.interior, static_cast<std::uint64_t>(options.training.seed), progress);
-  LiveOptions few = live;
-  few.samples = style_first_samples;
-  few.fine_centers = style_first_centers;
-  few.coarse_centers = few.fine_centers / 5;
-  RadialSolver quick(samples, handles, few, progress.part(0.0, 0.1), shape);
-  quick.set_contact(hooks.contact, true, progress);
-  quick.set_style(style, options.strength, options.sharpness, weights, up);
-  const std::shared_ptr<const RadialField> first =
-      quick.solve(std::min(style_first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
-  progress.preview([&](PointsIn points) { return first->at(points); });
+  double worst = std::numeric_limits<double>::infinity();
+  if (options.centers >= worth_a_first) {
+    LiveOptions few = live;
+    few.samples = style_first_samples;
+    few.fine_centers = style_first_centers;
+    few.coarse_centers = few.fine_centers / 5;
+    RadialSolver quick(samples, handles, few, progress.part(0.0, 0.1), shape);
+    quick.set_contact(hooks.contact, true, progress);
+    quick.set_style(style, options.strength, options.sharpness, weights, up);
+    const std::shared_ptr<const RadialField> first =
+        quick.solve(std::min(style_first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
+    progress.preview([&](PointsIn points) { return first->at(points); });
+    worst = quick.report().value;
+  }
   RadialSolver solver(samples, handles, live, progress.part(0.15, 0.3), shape);
   solver.set_contact(hooks.contact, true, progress);
   solver.set_style(style, options.strength, options.sharpness, weights, up);
   const Shown shown = [&] { return solver.field(); };
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity,
-                              shown, {.worst = quick.report().value, .least_gain = least_style_gain});
+                              shown, {.worst = worst, .least_gain = least_style_gain});
   solver.set_hooks({hooks.energies, 1.0 / options.rigidity, {}, hooks.terms});
   const bool ended = loop.stopped_by == StopReason::observer || loop.stopped_by == StopReason::time_budget;
   for (int round = 0; round < unfolding_rounds && options.surface.barrier > 0.0 && !ended; ++round) {

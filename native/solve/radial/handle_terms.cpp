@@ -99,6 +99,12 @@ void HandleTerms::choose_anchor() {
   reflect_pairs();
 }
 
+void HandleTerms::move_anchor(const Vec3& place) { pairs_.targets = with_reflections(place.transpose()); }
+
+void HandleTerms::rest_anchor() {
+  if (!any()) choose_anchor();
+}
+
 /// Adds each pair's reflection, with half of the weight for both: for symmetric fields the energy is the
 /// same, and the preconditioner becomes symmetric.
 void HandleTerms::reflect_pairs() {

@@ -21,6 +21,10 @@ class HandleTerms {
   void set_targets(const std::vector<Handle>& moved);
   /// The upward direction that defines the lowest sample.
   void set_up(const Vec3& up);
+  const Vec3& up() const { return up_; }
+  /// Without handles: holds the lowest sample at that place, in cube coordinates, or where it is at rest.
+  void move_anchor(const Vec3& place);
+  void rest_anchor();
 
   bool any() const { return !handles_.empty(); }
   const std::vector<Handle>& handles() const { return handles_; }

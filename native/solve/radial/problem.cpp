@@ -29,8 +29,9 @@ RadialProblem::RadialProblem(const SurfaceSamples& surface, const LiveOptions& s
   if (axis >= 0) samples = across(samples, axis);
   require_samples(samples);
   const auto seed = static_cast<std::uint64_t>(options.seed);
-  // Deform and stylize, which pass a shape in, evaluate the field off the surface as well.
-  const bool two_layers = shape || options.fine_centers >= worth_two_layers;
+  // Deform and stylize, which pass a shape in, evaluate the field off the surface as well. On a flat sheet
+  // no function of one layer has a slope across it.
+  const bool two_layers = shape || options.fine_centers >= worth_two_layers || samples.sheet_sizes.size() > 0;
   if (!shape) shape = std::make_shared<const RestShape>(samples, options.interior, seed, progress, axis);
   Random random(seed);
   const std::vector<Index> chosen = stratified(shape->order, options.samples, random);

@@ -6,6 +6,7 @@
 #include "core/parallel.h"
 #include "energies/alignment.h"
 #include "energies/shared_motion.h"
+#include "energies/stance.h"
 #include "sampling/sample_weights.h"
 #include "solve/radial/contact_solve.h"
 #include "solve/radial/handle_motion.h"
@@ -62,15 +63,18 @@ void follow_freely(RadialState& s, Index iterations, double tolerance, const Pro
   s.history.start.set(s.start_revisions(), std::move(start));
 }
 
-/// Translates the field so that the fixed sample's error is 0; no other term depends on translations.
-void anchor_lowest_point(RadialState& s) {
-  const Points& sources = s.handles.pairs().sources;
-  Points value(1, 3);
-  RadialEvaluator<double>(s.problem.basis, sources.topRows(1))
-      .evaluate(s.shape.coefficients, {value.data(), 1, JetOrder::value});
-  s.shape.coefficients.row(s.problem.basis.center_count()) += sources.row(0) - value.row(0);
+/// Translates the field so that the surface's middle stays where it is, seen from above, and the lowest
+/// sample keeps its height; no other term depends on translations. The sample is then held there.
+void anchor(RadialState& s) {
+  const Points places = anchor_places(s.handles.pairs().sources.row(0).transpose(), s.problem.energy_points);
+  Points values(places.rows(), 3);
+  RadialEvaluator<double>(s.problem.basis, places)
+      .evaluate(s.shape.coefficients, {values.data(), places.rows(), JetOrder::value});
+  const Vec3 shift = anchoring_shift(places, values, s.handles.up());
+  s.shape.coefficients.row(s.problem.basis.center_count()) += shift.transpose();
   if (s.problem.mirror) s.problem.mirror->symmetrise(s.shape.coefficients);
   ++s.shape.revision;
+  s.handles.move_anchor(values.row(0).transpose() + shift);
 }
 
 /// Fills the report's figures of triangles that pass through each other.
@@ -179,7 +183,7 @@ Index RadialSolver::follow(Index iterations, double tolerance, const Progress& p
     ContactSolve(s, iterations, std::max(tolerance, single_tolerance), freely, progress).follow();
   else
     freely(iterations);
-  if (!s.handles.any() && !s.hooks.adds_terms() && !s.contact.has_planes()) anchor_lowest_point(s);
+  if (!s.handles.any() && !s.hooks.adds_terms() && !s.contact.has_planes()) anchor(s);
   s.contact.end_at(s.shape.revision);
   s.report.contact.crossing.clear();
   for (const Index k : s.contact.crossing_surfaces())
@@ -220,6 +224,7 @@ void RadialSolver::reset() {
     handle.target_point = handle.rest_point;
   }
   set_targets(at_rest);
+  s.handles.rest_anchor();
   s.dynamics.zero_velocity(motions_of(s.handles.bound()));
   const double setup = s.report.setup_seconds;
   s.report = {};

@@ -37,7 +37,8 @@ class ARAPFIELDS_EXPORT RadialSolver {
   /// Other handles for the same surface; the next solve starts from the current shape.
   void set_handles(const std::vector<Handle>& handles);
   /// A style of this strength ≥ 0 (0 removes it) and sharpness σ (0: the style's own). `weights`: one for
-  /// each sample given to the constructor, or empty. Without handles, the lowest sample against `up` is held.
+  /// each sample given to the constructor, or empty. Without handles, the lowest sample against `up` keeps
+  /// its height, and the middle its place seen along `up`.
   void set_style(const Style& style, double strength, double sharpness, const Vector& weights = {},
                  const Vec3& up = Vec3::UnitZ());
   void clear_style();

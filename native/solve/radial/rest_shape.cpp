@@ -26,7 +26,8 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
   progress.check();
   order = canonical_order(samples.points);
   progress.check();
-  thickness = std::make_shared<const LocalThickness>(samples.points, samples.normals, order);
+  thickness =
+      std::make_shared<const LocalThickness>(samples.points, samples.normals, order, samples.sheet_sizes);
   progress.check();
   Random random(seed, site_stream);
   std::vector<Index> chosen = stratified(order, most_sites, random);

@@ -76,15 +76,17 @@ Locality RadialState::locality() {
   Locality result;
   result.options = problem.options.locality;
   if (!result.acts()) return result;
-  result.motion = shared_motion(handles.bound(), problem.mirror ? problem.mirror->axis : -1);
-  result.shares = held_shares.get({handles.revision(), problem.energy_revision}, [&] {
+  result.motion =
+      shared_motion(handles.bound(), problem.samples.size(), problem.mirror ? problem.mirror->axis : -1);
+  result.shares = locality_shares.get({handles.revision(), problem.energy_revision}, [&] {
     const auto folded = [&](Points points) {
       if (problem.mirror)
         points.col(problem.mirror->axis) = points.col(problem.mirror->axis).cwiseAbs().eval();
       return points;
     };
-    return arapfields::held_shares(folded(problem.energy_points), problem.shape->sites, problem.shape->parts,
-                                   folded(handles.pairs().sources));
+    return arapfields::locality_shares(folded(problem.energy_points), problem.energy_samples, handles.bound(),
+                                       folded(handles.pairs().sources),
+                                       {problem.shape->sites, problem.shape->parts});
   });
   return result;
 }

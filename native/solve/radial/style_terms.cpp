@@ -42,7 +42,7 @@ WeightedStyle StyleTerms::at_samples(const StyleRequest& request) const {
   StyleAtSamples style = StyleAtSamples::of(request.style, normals, request.sharpness);
   if (request.weights.size() > 0)
     style.weights.array() *= entries_of(request.weights, problem_.energy_samples).array();
-  const double weight = request.strength * problem_.options.gauss_weight * style.factor;
+  const double weight = style.share(request.strength) * problem_.options.gauss_weight * style.factor;
   return {std::move(style), weight};
 }
 

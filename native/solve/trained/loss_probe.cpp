@@ -94,7 +94,8 @@ double EnergyTrial::run() {
 }
 
 Vector probe_thickness(const SurfaceSamples& samples) {
-  const LocalThickness thickness(samples.points, samples.normals, canonical_order(samples.points));
+  const LocalThickness thickness(samples.points, samples.normals, canonical_order(samples.points),
+                                 samples.sheet_sizes);
   return thickness.at(samples.points) * samples.frame.scale;
 }
 

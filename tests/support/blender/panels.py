@@ -5,6 +5,7 @@ import bpy
 from support.blender import scenes
 
 import addon.registration as registration
+from addon.blender.section import TASKS
 from addon.core.errors import UserError
 from addon.core.runtime import jobs, native
 
@@ -68,20 +69,32 @@ class Layout:
     column = box = grid_flow = row
 
 
+def each_task():
+    """Shows the panel with each of its tasks in turn, and then as before."""
+    settings = bpy.context.scene.arapfields
+    before = settings.task
+    for task in TASKS:
+        settings.task = task
+        yield task
+    settings.task = before
+
+
 def shown():
-    """The panels that are shown."""
+    """The panels that are shown for one of the tasks."""
     classes = [cls for module in registration.MODULES for cls in getattr(module, "CLASSES", [])]
-    return [cls for cls in classes if issubclass(cls, bpy.types.Panel) and cls.poll(bpy.context)]
+    panels = [cls for cls in classes if issubclass(cls, bpy.types.Panel)]
+    found = {cls for _ in each_task() for cls in panels if cls.poll(bpy.context)}
+    return [cls for cls in panels if cls in found]
 
 
 def drawn():
-    """{panel: texts} of all shown panels; menus are drawn as well."""
-    sections = {}
+    """{panel: texts} of all panels shown for one of the tasks; menus are drawn as well."""
+    sections, panels = {}, set(shown())
     for module in registration.MODULES:
         for cls in getattr(module, "CLASSES", []):
             if not issubclass(cls, (bpy.types.Panel, bpy.types.Menu)) or "preset" in cls.__name__:
                 continue
-            if issubclass(cls, bpy.types.Panel) and not cls.poll(bpy.context):
+            if issubclass(cls, bpy.types.Panel) and cls not in panels:
                 continue
             texts = sections[cls.__name__] = []
             stand_in = type("Section", (), {"layout": Layout(texts), "fill": getattr(cls, "fill", None)})()

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Places and drags pins, as the pin tool does."""
 
+import types
+
 import bpy
 import numpy as np
+from mathutils import Vector
 from support.blender import scenes
 from support.blender.live import step
 
@@ -33,3 +36,11 @@ def state(source):
     shape = scenes.world_points(source).tobytes()
     kinds = bpy.data.objects, bpy.data.meshes, bpy.data.node_groups, bpy.data.scenes, source.modifiers
     return handles, empties, flags, chosen, shape, [sorted(kind.keys()) for kind in kinds]
+
+
+def from_above(x, y=0.0):
+    """A view along -z at a place."""
+    matrix = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1.0]])
+    ray = Vector((x, y, 5)), Vector((0, 0, -1))
+    given = {"pixel": (200, 200), "perspective": matrix, "size": (400, 400), "scale": 1.0}
+    return types.SimpleNamespace(ray=lambda: ray, towards=Vector((0, 0, 1)), **given)

@@ -98,7 +98,10 @@ def stylize(args):
 
         return with_progress("finish", run, args.quiet)
 
-    finishes = given(args, "stylize", "finish") and contact is None
+    is_mesh = not af.GaussianSplats.is_file(args.input)
+    finishes = given(args, "stylize", "finish") and contact is None and is_mesh
+    if finishes and args.option_centers is None:
+        options.centers = af.CENTERS_BEFORE_SHARPEN
     _solve(args, solve, options.seed, needs_handles=False, finish=finish if finishes else None)
 
 

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The top of the panel, without a title: the object, the tasks, and the pin tool."""
+
+import bpy
+
+from ..blender.language import translated
+from ..blender.point_data import face_count, points_of
+from ..blender.section import Section, tasks_of, wrapped
+from ..blender.splat_layouts import holds_splats
+from ..names import TOOL, Op
+
+
+def is_tool_taken(context):
+    """Whether the pin tool is the one in use in this workspace's Object Mode."""
+    tools = getattr(context.workspace, "tools", None)
+    tool = tools.from_space_view3d_mode("OBJECT", create=False) if tools is not None else None
+    return tool is not None and tool.idname == TOOL
+
+
+class ARAPFIELDS_PT_tasks(Section, bpy.types.Panel):
+    bl_label = "Tasks"
+    bl_order = 1
+    bl_options = {"HIDE_HEADER"}
+    needs_source = False
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and bool(tasks_of(context))
+
+    def fill(self, context, source, settings):
+        layout = self.layout
+        if source is not None:
+            text = counts_of(source)
+            wrapped(layout, f"{source.name}: {text}", icon="MESH_DATA")
+        if len(tasks_of(context)) > 1:
+            layout.use_property_split = False
+            layout.row(align=True).prop(context.scene.arapfields, "task", expand=True)
+            row = layout.row()
+            row.scale_y = 1.6
+            row.operator(Op.PIN_TOOL, text="Pin", icon="PINNED", depress=is_tool_taken(context))
+
+
+def counts_of(source):
+    """How many points an object has."""
+    counts = {"vertices": f"{len(points_of(source.data)):,}", "faces": f"{face_count(source.data):,}"}
+    if holds_splats(source):
+        return translated("{count} splats", count=counts["vertices"])
+    return translated("{vertices} vertices, {faces} faces", **counts)
+
+
+CLASSES = [ARAPFIELDS_PT_tasks]
