@@ -10,14 +10,14 @@ import pytest
 import arapfields as af
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender_scripts"))
-import menagerie
+import creatures
 
 EVEN = 0.15  # of the share; for a cube
 
 
 @pytest.mark.parametrize("name", ["dog", "dinosaur"])
 def test_a_share_of_the_strength_goes_that_share_of_the_way(name):
-    shape = menagerie.load(name)
+    shape = creatures.load(name)
     rest, triangles, up = shape.vertices.astype(float), shape.triangles, [0, 0, 1]
     samples = af.sample_mesh(rest, triangles, count=20000, seed=0)
 
