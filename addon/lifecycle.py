@@ -36,7 +36,8 @@ def before_load(*_):
     passing = (jobs.board, held_counts.pending, staleness.changed, row_selection.seen, prefetch)
     for state in (*passing, applying.solved, first_result.steps, left_behind.seen, stored.shapes):
         state.clear()
-    applied_transforms.clear()
+    applied_transforms.seen.clear()
+    applied_transforms.followed.clear()
     carrying.written.clear()
     sessions.stop_all()
     jobs.forget_messages()
@@ -157,7 +158,8 @@ STATE += (
     style_object.cache,
     left_behind.seen,
     stored.shapes,
-    applied_transforms,
+    applied_transforms.seen,
+    applied_transforms.followed,
     pin_hints.status,
     symmetry.planes,
     first_run.welcome,

@@ -66,6 +66,9 @@ class Status:
     def clear(self):
         self.show("")
 
+    def __bool__(self):
+        return bool(self.text)
+
 
 status = Status()
 
