@@ -20,8 +20,8 @@ from .jobs.display import display
 from .live import recovery, rendering, sessions, stored, touching
 from .live.prefetch import prefetch
 from .pin_tool import drawing as pin_drawing
-from .pin_tool import hints as pin_hints
 from .pin_tool import tool
+from .pin_tool.hints import status
 from .pin_tool.hover import hover
 from .poses import applying
 from .solver import style_object
@@ -160,7 +160,7 @@ STATE += (
     stored.shapes,
     applied_transforms.seen,
     applied_transforms.followed,
-    pin_hints.status,
+    status,
     symmetry.planes,
     first_run.welcome,
 )
