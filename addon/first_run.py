@@ -26,6 +26,9 @@ class Welcome:
     def clear(self):
         self.until = 0.0
 
+    def __bool__(self):
+        return self.until > 0.0
+
 
 welcome = Welcome()
 

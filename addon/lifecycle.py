@@ -20,8 +20,8 @@ from .jobs.display import display
 from .live import recovery, rendering, sessions, stored, touching
 from .live.prefetch import prefetch
 from .pin_tool import drawing as pin_drawing
-from .pin_tool import hints as pin_hints
 from .pin_tool import tool
+from .pin_tool.hints import status
 from .pin_tool.hover import hover
 from .poses import applying
 from .solver import style_object
@@ -36,7 +36,8 @@ def before_load(*_):
     passing = (jobs.board, held_counts.pending, staleness.changed, row_selection.seen, prefetch)
     for state in (*passing, applying.solved, first_result.steps, left_behind.seen, stored.shapes):
         state.clear()
-    applied_transforms.clear()
+    applied_transforms.seen.clear()
+    applied_transforms.followed.clear()
     carrying.written.clear()
     sessions.stop_all()
     jobs.forget_messages()
@@ -158,8 +159,9 @@ STATE += (
     style_object.cache,
     left_behind.seen,
     stored.shapes,
-    applied_transforms,
-    pin_hints.status,
+    applied_transforms.seen,
+    applied_transforms.followed,
+    status,
     symmetry.planes,
     first_run.welcome,
 )

@@ -47,11 +47,6 @@ seen = {}  # {session_uid: Placement} at the last check
 followed = {}  # {state of an object before a change has been followed: that change}
 
 
-def clear():
-    seen.clear()
-    followed.clear()
-
-
 def placement_of(source):
     vertices, matrix = source.data.vertices, np.array(source.matrix_world, dtype=np.float64)
     some = np.linspace(0, len(vertices) - 1, min(COMPARED, len(vertices))).astype(int).tolist()

@@ -69,4 +69,10 @@ class Display:
         self._timer = None
 
 
+def show_status(text):
+    """Puts a text into the status bar of all windows; "" restores Blender's own."""
+    for window in bpy.context.window_manager.windows:
+        window.workspace.status_text_set(text or None)
+
+
 display = Display()

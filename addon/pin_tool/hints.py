@@ -5,6 +5,7 @@ import bpy
 
 from ..blender import timers
 from ..blender.language import translated
+from ..jobs.display import show_status
 from . import pins
 from .drawing import is_active
 from .hover import hover
@@ -58,13 +59,15 @@ class Status:
         if text == self.text:
             return
         self.text = text
-        for window in bpy.context.window_manager.windows:
-            window.workspace.status_text_set(text or None)
+        show_status(text)
         if text:
             timers.start(watch, first=INTERVAL, persistent=True)
 
     def clear(self):
         self.show("")
+
+    def __bool__(self):
+        return bool(self.text)
 
 
 status = Status()

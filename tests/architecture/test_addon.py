@@ -14,6 +14,7 @@ ORDER = [
     "blender",
     "properties",
     "jobs",
+    "tasks",
     "field_modifier",
     "field_nodes",
     "handles",

@@ -93,7 +93,7 @@ def is_busy(state):
         return state._timer is not None or bool(state._previews)
     if state is previews.shown:
         return state.mesh is not None
-    return bool(state) if isinstance(state, (dict, set)) else bool(state._started)
+    return bool(state._started) if state is timers else bool(state)
 
 
 def enter(state):
