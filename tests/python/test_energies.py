@@ -557,7 +557,7 @@ def test_up_is_where_the_head_is():
     lying = af.SurfaceSamples(
         samples.points @ turn.T, samples.normals @ turn.T, frame=af.Frame([0, 0, 0], 1.0)
     )
-    options = af.StylizeOptions(field="radial", iterations=60)
+    options = af.StylizeOptions(field="radial", iterations=200)
     first = af.stylize(samples, "square pyramid", options)
     second = af.stylize(lying, "square pyramid", options, orientation=turn, up=turn @ [0, 0, 1])
     for field, s, up in ((first, samples, np.eye(3)[2]), (second, lying, turn[:, 2])):
