@@ -27,6 +27,8 @@ LEFT_OUT = {  # {public callable that is not fuzzed: reason}
 def public_callables():
     """Names of all functions, constructible classes and members of the package."""
     for name, value in vars(af).items():
+        if not callable(value):
+            continue
         if name.startswith("_") or isinstance(value, types.ModuleType) or hasattr(value, "__origin__"):
             continue
         if not isinstance(value, type):
