@@ -111,7 +111,8 @@ def put_back(context, source, way):
             moved, by, factor = one
             with contextlib.suppress(UserError):  # the mesh has changed
                 inputs.put(motion.bind(context, source), "Factor", factor)
-                motion.write(source, moved)
+                if moved.offsets is not None:  # an undo may have emptied what held them
+                    motion.write(source, moved)
                 settings_of(source).moved_by = by
     if way.is_covered:
         uncover(source, baked=True)

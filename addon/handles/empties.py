@@ -13,7 +13,7 @@ from ..blender.property_definitions import from_single_precision
 from ..blender.selection import choose_row
 from ..core.errors import UserError, refuse
 from ..core.geometry.handles import far_handle, solve_handle
-from ..core.geometry.spaces import Space, inverse, transform
+from ..core.geometry.spaces import Space, inverse, space_of, transform
 from ..core.runtime.coroutines import run_to_completion
 from ..names import HANDLES, HANDLES_MARK
 from . import movers, naming, symmetry
@@ -27,7 +27,8 @@ def rest_box(source, entry, where=matrix_of):
 
 
 def store_rest(source, entry):
-    """Stores the present pose of the handle's Empty or bone as its rest pose."""
+    """Stores the present pose of the handle's Empty or bone as its rest pose; UserError for a flat source."""
+    space_of(matrix_of(source), source.name)
     entry.rest, entry.unwrapped = movers.box_in_source(entry).ravel(), np.zeros(16)
     entry.frame = bpy.context.scene.frame_current
 
@@ -132,6 +133,7 @@ def add(source, empty, kind="CUBE"):
     """Makes an Empty a handle of the source, with its present pose as rest pose; resets an existing one."""
     if empty.empty_display_type == "IMAGE":
         raise UserError("{name} shows an image; take another kind of Empty", empty)
+    space_of(matrix_of(source), source.name)
     if abs(np.linalg.det(current_box(empty)[:3, :3])) == 0:
         raise UserError("{name} is flat; give it a size and a scale other than zero", empty)
     settings = settings_of(source)

@@ -19,8 +19,8 @@ namespace {
 constexpr double overlap_share = 0.25;
 /// Neighbours on one sheet: largest distance, in spacings, and least cosine of the normals.
 constexpr double sheet_spacings = 2.5, sheet_cosine = 0.3;
-/// Largest cosine of the normals on both sides of a thin part.
-constexpr double opposite_cosine = -0.5;
+/// Both sides of a thin part: its largest width, in spacings, and largest cosine of the normals.
+constexpr double thin_spacings = 0.8, opposite_cosine = -0.9;
 /// InnerBallRules: least_cosine, for the widths of thin parts.
 constexpr double thin_cosine = 0.2;
 
@@ -38,7 +38,7 @@ InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing, c
   // in the mean of both planes' distances the part's curvature cancels.
   const auto are_opposite = [&](Index i, Index j) {
     const double width = 2.0 * std::max(thin[i], thin[j]);
-    if (width > spacing || normals.row(i).dot(normals.row(j)) > opposite_cosine) return false;
+    if (width > thin_spacings * spacing || normals.row(i).dot(normals.row(j)) > opposite_cosine) return false;
     const double apart = 0.5 * (nodes.row(i) - nodes.row(j)).dot(normals.row(i) - normals.row(j));
     return apart > 0.0 && apart < (1.0 + overlap_share) * width;
   };

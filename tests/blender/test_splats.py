@@ -101,13 +101,13 @@ def test_the_splat_nearest_to_the_viewer_is_pinned_and_dragged():
     perspective, size = np.array([[2, 0, 0, 0], [0, 0, 2, 0], [0, 1, 0, 2.9], [0, 1, 0, 3]]), (400, 400)
     pixels = screen.project(perspective, size, seen)
     view = SimpleNamespace(perspective=perspective, size=size, scale=3.0, towards=(0, -1, 0), pixel=pixels[7])
-    met = hover.splat_under(bpy.context, view)
+    met = hover.splat_under(bpy.context, view, None)
     near = np.linalg.norm(pixels - view.pixel, axis=1) <= hover.SPLAT_REACH * view.scale
     front = seen[near][seen[near, 1].argmin()]
     assert met.kind == "SURFACE" and met.source.get() == item and np.ptp(seen[near, 1]) > 0.3
     assert np.abs(met.location - front).max() < 1e-6
     view.pixel = (5, 5)
-    assert hover.splat_under(bpy.context, view) is None
+    assert hover.splat_under(bpy.context, view, None) is None
     item.matrix_world = Matrix()
     bpy.context.view_layer.update()
     held, end = rest[rest[:, 0].argmin()], rest[rest[:, 0].argmax()]

@@ -58,7 +58,7 @@ def test_parts_that_cut_each_other_are_dragged_as_without_contact(way, crumples)
     live = af.LiveDeformer(samples, handles, contact=af.Contact(itself=True))
     rest = live.solve(iterations=60)(vertices)
     flipped, energy = drag(live, way)
-    back = live.solve([TRUNK, *HANDS], iterations=60, tolerance=1e-6)(vertices)
+    back = live.solve([TRUNK, *HANDS], iterations=200, tolerance=1e-6)(vertices)  # from crumples takes long
     assert np.abs(back - rest).max() < 1e-3 * HEIGHT
     assert max(flipped) <= max(free[0]) + FLIPPED
     assert energy < (CRUMPLED if crumples else PRESSED) * free[1]

@@ -46,7 +46,7 @@ BLENDER = {
     "test_commands.py::test_a_batch_that_is_killed_takes_its_blenders_along": PROC,
 }
 CORE = {
-    "test_batch.py::test_one_failure_or_crash_stops_no_other": "no process of Windows ends by a signal",
+    "test_batch.py::test_failures_stop_no_other_file_and_a_second_run_finishes": "signals end none there",
 }
 NOT_RUN = {f"tests/python/{name}": why for name, why in PYTHON.items()}
 NOT_RUN |= {f"tests/blender/{name}": why for name, why in BLENDER.items()}

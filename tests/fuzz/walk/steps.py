@@ -174,7 +174,7 @@ class Steps(Undoing):
         entry = self.entry()
         if entry is None:
             return None
-        pins.select(bpy.context, entry.empty)
+        pins.choose(bpy.context, entry.empty)
         bpy.ops.arapfields.pin_delete()
         return "pin deleted"
 
