@@ -6,11 +6,15 @@
 // lock in their turn abort the process, and those that drop Python's objects do so without the lock. So no
 // call of this module lets it through: the thread stops where it is, as Python 3.14 has it do, and the
 // process ends without it. The linker puts these functions in the places of Python's own (--wrap), in
-// pybind11 too; CMakeLists.txt takes their names from here.
+// pybind11 too; CMakeLists.txt takes their names from here. NumPy's functions, which let the lock go while
+// they copy, are called through pybind11's table of them, and stop there likewise.
+#include "bindings/ended_interpreter.h"
+
 #if defined(__linux__)
 
 #include <Python.h>
 #include <cxxabi.h>
+#include <pybind11/numpy.h>
 
 #include <chrono>
 #include <thread>
@@ -26,7 +30,39 @@ auto or_stop(Call&& call) {
   }
 }
 
+using NumpyTable = pybind11::detail::npy_api;
+
+/// Replaces a function in the table by one that stops.
+template <auto member>
+struct InTable;
+template <class Result, class... Given, Result (*NumpyTable::*member)(Given...)>
+struct InTable<member> {
+  static inline Result (*real)(Given...) = nullptr;
+  static Result call(Given... given) {
+    return or_stop([&] { return real(given...); });
+  }
+  static void put(NumpyTable& table) {
+    if (table.*member == &call) return;
+    real = table.*member;
+    table.*member = &call;
+  }
+};
+
 }  // namespace
+
+namespace arapfields::python {
+
+void stop_in_numpy() {
+  NumpyTable& table = NumpyTable::get();
+  InTable<&NumpyTable::PyArray_CopyInto_>::put(table);
+  InTable<&NumpyTable::PyArray_FromAny_>::put(table);
+  InTable<&NumpyTable::PyArray_NewCopy_>::put(table);
+  InTable<&NumpyTable::PyArray_NewFromDescr_>::put(table);
+  InTable<&NumpyTable::PyArray_Newshape_>::put(table);
+  InTable<&NumpyTable::PyArray_Resize_>::put(table);
+}
+
+}  // namespace arapfields::python
 
 // clang-format off
 #define STOPPING(result, name, parameters, arguments)            \

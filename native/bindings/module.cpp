@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
+#include "bindings/ended_interpreter.h"
 #include "bindings/files.h"
 #include "bindings/uninitialised.h"
 #include "bindings/wrong_types.h"
@@ -8,6 +9,7 @@ PYBIND11_MODULE(_native, module) {
   using namespace arapfields::python;
   module.doc() = "Native part of arapfields.";
   module.attr("__version__") = ARAPFIELDS_VERSION;
+  stop_in_numpy();
   bind_core(module);
   bind_options(module);
   bind_mesh(module);
