@@ -186,18 +186,18 @@ class FrameSolver:
 
     def tracked_shape(self, request):
         """The request's shape as the solver tracks it, in single precision."""
-        return self._shape(request, None if self.moves_splats else self.solver.tracked(), self.solver.field)
+        return self._shape(request, None if self.moves_splats else self.solver.tracked())
 
     def exact_shape(self, request):
         """The request's shape, evaluated from the field."""
-        field = self.solver.field
-        return self._shape(request, field(self.rest, triangles=self.rest_triangles), field)
+        return self._shape(request, self.solver.field(self.rest, triangles=self.rest_triangles))
 
-    def _shape(self, request, solved, field):
+    def _shape(self, request, solved, field=None):
+        """`field`: by default the solver's, made where something needs it."""
         surface, topology = self.sampled.setup.surface, self.sampled.topology
         needs_field = request.carried or surface.has_free_normals or surface.splats is not None
         needs_field = needs_field or self.before.needs_field
-        moved = field if needs_field else None
+        moved = (self.solver.field if field is None else field) if needs_field else None
         further = {"before": self.before} if topology is None else {}
         samples = self.sampled.samples
         carried = self.carrying.moved(native.library(), samples, moved, request.carried, **further)
