@@ -215,7 +215,8 @@ const Points& ContactPoints::at(const RowMatrix<double>& coefficients) {
   places.topRows(known) = places_;
   const auto fill = [&](Dependent<RadialEvaluator<float>, 1>& made, Revision of, Index first, Index count) {
     const RadialEvaluator<float>& evaluator = made.get({of}, [&] {
-      const Points embedded = embedded_.middleRows(first, embedded_.rows() > 0 ? count : 0);
+      Points embedded;
+      if (embedded_.rows() > 0) embedded = embedded_.middleRows(first, count);
       return RadialEvaluator<float>(problem_.basis, rest_.middleRows(first, count), JetOrder::value,
                                     embedded.rows() > 0 ? &embedded : nullptr);
     });
