@@ -122,6 +122,7 @@ Solution deform(const SurfaceSamples& samples, const std::vector<Handle>& handle
 
   LoopOptions loop = training_of(options);
   loop.observer = hooks.observer;
+  terms.estimates = static_cast<Index>(loop.training.iterations) * loop.steps;
   WrapObjective wrap;
   if (options.invertibility > 0.0)
     wrap = [&](Objective& inner) {

@@ -35,6 +35,12 @@ def dragged(samples, handles, **options):
     )
 
 
+def trained(samples, handles, **options):
+    """By a small network."""
+    network = dict(field="neural", width=64, layers=2, iterations=300, seed=0)
+    return af.deform(samples, handles, af.DeformOptions(**network | {"locality": WEIGHT} | options))
+
+
 SOLVES = pytest.mark.parametrize("solve", [deformed, dragged])
 
 
@@ -42,7 +48,7 @@ def way(field, points):
     return np.linalg.norm(field(points) - points, axis=1).max()
 
 
-@SOLVES
+@pytest.mark.parametrize("solve", [deformed, dragged, trained])
 def test_the_other_leg_of_a_fork_stays(samples, solve):
     handles = [moved(MIDDLE), moved(TIP, BENT)]
     other = samples.points[samples.points[:, 0] < -0.1]

@@ -2,6 +2,8 @@
 #include "solve/trained/field_objective.h"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "distance/morton.h"
 #include "energies/composed_energies.h"
@@ -35,6 +37,22 @@ JetTermSettings with_bend(JetTermSettings settings, const SurfaceStiffness& stif
   return settings;
 }
 
+// A network moves all of the shape in its first steps, and ends in the valley where these lead: so it is held
+// to the rest shape most at first, however far it goes.
+constexpr double eased_from = 0.3,
+                 eased_until = 0.8;   // of a training: after it the options hold as they are given
+constexpr double first_weight = 5.0;  // before it, relative to the weight of the options
+constexpr double first_limit = 1.0;   // before it, in cube units
+constexpr Index eased_stages = 32;    // between the two
+
+/// Weight and limit fall geometrically to those given; `left` falls from 1 to 0.
+LocalityOptions eased(LocalityOptions options, double left) {
+  options.locality *= std::pow(first_weight, left);
+  if (options.locality_limit < first_limit)
+    options.locality_limit *= std::pow(first_limit / options.locality_limit, left);
+  return options;
+}
+
 }  // namespace
 
 FieldObjective::FieldObjective(const SurfaceSamples& samples, ObjectiveTerms terms)
@@ -55,7 +73,20 @@ Index FieldObjective::next_fresh(Random& random) {
   return used_++;
 }
 
+void FieldObjective::ease_locality() {
+  if (!terms_.locality.acts() || terms_.estimates == 0) return;
+  const double done = static_cast<double>(estimated_++) / static_cast<double>(terms_.estimates);
+  const auto stage = static_cast<Index>(
+      eased_stages * std::clamp((done - eased_from) / (eased_until - eased_from), 0.0, 1.0));
+  if (std::exchange(eased_, stage) == stage) return;
+  JetTermSettings settings = terms_;
+  settings.locality.options =
+      eased(terms_.locality.options, 1.0 - static_cast<double>(stage) / static_cast<double>(eased_stages));
+  list_ = JetTermList(with_bend(std::move(settings), terms_.stiffness));
+}
+
 TermBatch FieldObjective::draw(Random& random) {
+  ease_locality();
   const Index available = samples_.size(), count = std::min(terms_.batch, available);
   const bool has_normals = samples_.normals.rows() == available;
   TermBatch batch{Points(count, 3), Points(has_normals ? count : 0, 3),

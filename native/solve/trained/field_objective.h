@@ -18,6 +18,7 @@ class Tensor;
 /// The terms of a trained deformation: those of jets, and handles.
 struct ObjectiveTerms : JetTermSettings {
   Index batch = 0;             ///< samples an iteration
+  Index estimates = 0;         ///< in a whole training, at most
   Index fresh = 0;             ///< number of the batch's samples that samples.redraw draws anew
   SurfaceStiffness stiffness;  ///< λ
   Vector weights;              ///< w, one a sample; empty: all 1
@@ -39,6 +40,7 @@ class FieldObjective final : public Objective {
 
  private:
   TermBatch draw(Random& random);
+  void ease_locality();
   bool pulled() const { return terms_.handles.count() > 0 && terms_.pull.handle_weight != 0.0; }
   template <class Scalar>
   double by_kernels(TrainableField& field, Random& random);
@@ -57,6 +59,7 @@ class FieldObjective final : public Objective {
   SurfaceSamples pool_;
   Vector pool_bending_;
   Index used_ = 0;
+  Index estimated_ = 0, eased_ = -1;
   JetTermList list_;
   std::unique_ptr<EnergyTables> tables_;  // on the field's device
   // The last estimate's weighted terms, where they were computed.
