@@ -1,20 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bones of armatures as handles."""
+"""Bones as handles, their names, and a whole character that they move."""
 
 import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
 
+import arapfields as af
+
 if IN_BLENDER:
     import bpy
-    from support.blender import scenes
+    from support.blender import character, scenes
     from support.blender.bones import handles_of, rigged_bar
     from support.blender.live import step
 
     from addon.blender import modifier_stack
+    from addon.core.runtime import jobs
     from addon.live import sessions
+    from addon.solver import setup
 
 pytestmark = pytest.mark.in_blender
+
+# Bones of armatures as handles.
 
 QUICK = {"field": "radial", "samples": 1000}
 STOPPED = 5e-4  # of the size: how far apart solves end whose targets differ by rounding alone
@@ -219,3 +225,180 @@ def test_an_armature_modifier_without_an_armature_is_passed_over():
         bpy.ops.arapfields.add_bones()
     assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}
     assert bpy.ops.arapfields.live() == {"FINISHED"}
+
+
+# Bones that are handles, and what else is known by a name, renamed.
+
+
+def renamed_second(rig, way):
+    """Renames the bones of an armature; the new name of the second one."""
+    if way == "swapped":
+        for old, new in (("Second", "other"), ("Bone", "Second"), ("other", "Bone")):
+            rig.data.bones[old].name = new
+        return "Bone"
+    if way == "copied":  # a copy keeps what tells the bone from others
+        scenes.activate(rig)
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.armature.select_all(action="SELECT")
+        bpy.ops.armature.duplicate()
+        bpy.ops.object.mode_set(mode="OBJECT")
+    if way == "edited":
+        scenes.edit_bones(rig, lambda bones: setattr(bones["Second"], "name", "Arm"))
+    else:
+        rig.data.bones["Second"].name = "Arm"
+    return "Arm"
+
+
+@pytest.mark.parametrize("way", ["posed", "edited", "swapped", "copied"])
+@pytest.mark.parametrize("with_groups", [True, False])
+def test_a_renamed_bone_stays_a_handle_and_live(way, with_groups):
+    bar, rig = rigged_bar(with_groups)
+    if with_groups:
+        bpy.ops.arapfields.add_bones()
+    else:
+        bpy.ops.arapfields.add_bones(bones="DEFORMING")
+    scenes.activate(bar)
+    bpy.ops.arapfields.live()
+    rig.pose.bones["Second"].rotation_euler.z = 0.4
+    step(refined=True)
+    before = scenes.world_points(bar)
+    name = renamed_second(rig, way)
+    step(refined=True)
+    size = np.ptp(before, axis=0).max()
+    assert sessions.is_live(bar) and np.abs(scenes.world_points(bar) - before).max() < STOPPED * size
+    rig.pose.bones[name].rotation_euler.z = 0.8
+    step(refined=True)
+    moved = scenes.world_points(bar)
+    assert np.abs(moved - before).max() > 0.3
+    bpy.ops.arapfields.live()
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.deform(**QUICK) == {"FINISHED"}
+    assert np.abs(scenes.world_points(bar) - moved).max() < 0.05 * size
+    again = bpy.ops.arapfields.add_bones if with_groups else bpy.ops.arapfields.set_rest
+    scenes.activate(rig, bar)
+    if way != "copied":
+        assert again() == {"FINISHED"} and len(bar.arapfields.handles) == 2
+
+
+def test_a_renamed_bone_is_undone_and_redone_while_live():
+    setup.SAMPLES = 500
+    bar, rig = rigged_bar()
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.arapfields.add_bones()
+    scenes.activate(bar)
+    bpy.ops.arapfields.live()
+    rig.pose.bones["Second"].rotation_euler.z = 0.4
+    step(refined=True)
+    names = ["Second", "Arm", "Hand"]
+    for name in names:
+        bpy.data.armatures[0].bones[1].name = name
+        bpy.ops.ed.undo_push(message=name)
+        step(refined=True)
+    shown = scenes.world_points(bpy.data.objects["Bar"])
+    for undone, name in ((True, "Arm"), (True, "Second"), (False, "Arm"), (False, "Hand")):
+        (bpy.ops.ed.undo if undone else bpy.ops.ed.redo)()
+        step(refined=True)
+        bar = bpy.data.objects["Bar"]
+        assert bpy.data.armatures[0].bones[1].name == name and sessions.is_live(bar)
+        assert np.abs(scenes.world_points(bar) - shown).max() < STOPPED * np.ptp(shown, axis=0).max()
+
+
+def test_a_renamed_armature_modifier_is_on_again_after_live():
+    bar, _ = rigged_bar()
+    bpy.ops.arapfields.add_bones()
+    scenes.activate(bar)
+    bpy.ops.arapfields.live()
+    bar.modifiers["Armature"].name = "Rig"
+    bpy.ops.arapfields.live()
+    assert bar.modifiers["Rig"].show_viewport and bar.modifiers["Rig"].show_render
+
+
+# A whole character moves by its bones: eyes stay in their sockets, hair on the head.
+
+STEPS = 4  # of live mode, in which its solver comes to rest
+
+
+@pytest.mark.slow  # about ten seconds
+def test_a_character_moves_whole():
+    person = character.build()
+    rest = {
+        item.name: character.seen_mesh(item)[0]
+        for item in (person.body, person.shirt, person.hat, *person.eyes)
+    }
+    skin = rest["Body"], character.seen_mesh(person.body)[2]
+    strands = hair_points(person.hair)
+    jobs.board.messages.clear()
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    for share in np.linspace(0, 1, 4)[1:]:
+        character.pose(person, neck=share * np.pi / 4, arm=share * np.pi / 3)
+        for _ in range(STEPS):
+            step(refined=True)
+    assert sessions.is_live(person.body) and not jobs.messages(), jobs.messages()
+    now = {name: character.seen_mesh(bpy.data.objects[name])[0] for name in rest}
+    posed = now["Body"], skin[1]
+    figures = {}
+
+    head = rest["Body"][:, 2] > 1.6
+    turn = rigid(rest["Body"][head], now["Body"][head])
+    angle = np.degrees(np.arccos((np.trace(turn[:3, :3]) - 1) / 2))
+    figures["head turned, degrees"] = angle
+    hand = rest["Body"][:, 0] > 0.75
+    figures["hand raised"] = (now["Body"][hand] - rest["Body"][hand])[:, 2].mean()
+
+    for eye in person.eyes:
+        before, after = rest[eye.name], now[eye.name]
+        center = before.mean(axis=0)
+        socket = np.linalg.norm(rest["Body"] - center, axis=1) < 2.5 * character.EYE
+        with_socket = rigid(rest["Body"][socket], now["Body"][socket])
+        off = after.mean(axis=0) - (with_socket[:3, :3] @ center + with_socket[:3, 3])
+        figures[f"{eye.name} off its socket, of its radius"] = np.linalg.norm(off) / character.EYE
+        depths = distances(*skin, before), distances(*posed, after)
+        clear = np.abs(depths[0]) > 0.05 * character.EYE
+        figures[f"{eye.name} cut by the skin, vertices"] = int((depths[0] * depths[1] < 0)[clear].sum())
+
+    off = distances(*skin, rest["Shirt"]), distances(*posed, now["Shirt"])
+    figures["shirt's distance changes on average"] = np.abs(off[1] / off[0] - 1).mean()
+    figures["shirt's mean distance changes"] = abs(off[1].mean() / off[0].mean() - 1)
+    figures["shirt's least distance, of its own"] = (off[1] / off[0]).min()
+
+    roots = hair_points(person.hair)[:, 0]
+    figures["hair roots off the scalp, of the size"] = (
+        np.abs(distances(*posed, roots)).max() / character.HEIGHT
+    )
+    figures["hair roots off at rest"] = np.abs(distances(*skin, strands[:, 0])).max() / character.HEIGHT
+    on_head = rest["Hat"] @ turn[:3, :3].T + turn[:3, 3]
+    figures["hat off the head's motion, of the size"] = (
+        np.linalg.norm(now["Hat"] - on_head, axis=1).max() / character.HEIGHT
+    )
+    for name, value in figures.items():
+        print(f"{name}: {value:.3g}")
+
+    assert 40 < figures["head turned, degrees"] < 50 and figures["hand raised"] > 0.4
+    for eye in person.eyes:
+        assert figures[f"{eye.name} off its socket, of its radius"] < 0.02
+        assert not figures[f"{eye.name} cut by the skin, vertices"]
+    assert figures["shirt's distance changes on average"] <= 0.03
+    assert figures["shirt's least distance, of its own"] > 0
+    assert figures["hair roots off the scalp, of the size"] <= 1e-4
+    assert figures["hat off the head's motion, of the size"] < 0.02
+    bpy.ops.arapfields.live()
+    character.pose(person, 0, 0)
+    for name, before in rest.items():
+        assert np.abs(character.seen_mesh(bpy.data.objects[name])[0] - before).max() < 1e-4
+
+
+def distances(vertices, triangles, points):
+    """(p,) signed distances of points from a surface, negative inside."""
+    return af.signed_distance(vertices, triangles, points)
+
+
+def hair_points(hair):
+    """(strands, points of each, 3) as they are shown."""
+    data = hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    flat = np.empty(3 * len(data.points), np.float32)
+    data.attributes["position"].data.foreach_get("vector", flat)
+    return flat.reshape(len(data.curves), -1, 3).astype(np.float64)
+
+
+def rigid(before, after):
+    return af.rigid_motion(before, after)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact in Blender: shapes stay outside of what is in the way, and refusals have sentences."""
+"""Contact with obstacles, the ground and the mesh itself."""
 
 import numpy as np
 import pytest
@@ -21,6 +21,8 @@ if IN_BLENDER:
     from addon.solver import contact
 
 pytestmark = pytest.mark.in_blender
+
+# Contact in Blender: shapes stay outside of what is in the way, and refusals have sentences.
 
 
 def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
@@ -249,3 +251,66 @@ def test_the_pin_tool_has_the_switch_where_there_are_handles():
     scenes.activate(bar)
     ARAPFIELDS_TOOL_pin.draw_settings(bpy.context, Layout(shown), None)
     assert shown.count("Contact") == 1
+
+
+# The dots that show where a live shape presses.
+
+
+def test_dots_come_back_with_what_undo_brings_back():
+    """Of the shape that comes back, and none where it lies free."""
+    bar, block, _ = pressed()
+    down, size = bpy.data.objects["Moving"].location.z, max(bar.dimensions)
+    bpy.data.objects["Moving"].location.z += 0.8
+    scenes.activate(block, bar)
+    bpy.ops.arapfields.add_obstacle()
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.arapfields.live(kind="DEFORM")
+    lowest(bar)
+    bpy.ops.ed.undo_push(message="live")
+    bpy.data.objects["Moving"].location.z = down
+    bpy.context.view_layer.update()
+    lowest(bar)
+    bpy.ops.ed.undo_push(message="down")
+    pressing = touching.places()
+    assert len(pressing) > 3
+    for again, presses in zip("urururuurr", (0, 1, 0, 1, 0, 1, 0, None, 0, 1), strict=True):
+        (bpy.ops.ed.undo if again == "u" else bpy.ops.ed.redo)()
+        lowest(bpy.data.objects["Bar"])
+        scenes.activate(bpy.data.objects["Bar"])
+        found = touching.places()
+        assert bool(len(found)) == bool(presses), (again, presses, len(found))
+        if presses:
+            nearest = np.linalg.norm(found[:, None] - pressing, axis=2).min(axis=1)
+            assert nearest.max() < 0.05 * size
+
+
+# Collections in the list of obstacles.
+
+
+def test_a_collection_that_puts_nothing_in_the_way_is_said():
+    bar, *_ = scenes.bar_with_handles()
+    block = scenes.bar("Block")
+    block.location.z = -1
+    group, real, placed = (
+        bar.arapfields.contact,
+        *(bpy.data.collections.new(name) for name in ("Real", "Set")),
+    )
+    for one in (real, placed):
+        bpy.context.scene.collection.children.link(one)
+    real.objects.link(block)
+    bpy.context.collection.objects.unlink(block)
+    instance = bpy.data.objects.new("Placed", None)
+    placed.objects.link(instance)
+    instance.instance_type, instance.instance_collection = "COLLECTION", real
+    group.use = True
+    entry = group.obstacle_list.add()
+    entry.group = real
+    assert contact.entry_refusal(bar, entry) is None
+    bpy.context.view_layer.layer_collection.children["Real"].exclude = True
+    bpy.context.view_layer.update()
+    assert str(contact.refusal(bar)) == "Real has no visible mesh that is in the way"
+    entry.group = placed
+    assert str(contact.refusal(bar)) == "Placed is an instance; make it real to have it in the way"
+    scenes.activate(bar)
+    with pytest.raises(RuntimeError, match="Placed is an instance"):
+        bpy.ops.arapfields.deform()

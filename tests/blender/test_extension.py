@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built extension in several Blenders: installed from its zip, used, removed; beside another torch."""
+"""The extension as a zip in several Blenders, and as a module that a script registers."""
 
 import os
 import shutil
@@ -8,11 +8,18 @@ import sys
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.blender import blenders
+from support.blender.inside import require_bpy
+from support.geometry import cases
+from support.geometry.scan import splats
+
+from arapfields.cli import splat_files
+
+# The built extension in several Blenders: installed from its zip, used, removed; beside another torch.
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="session")
@@ -36,6 +43,7 @@ def blender(request, tmp_path):
         shutil.rmtree(program.folder)
 
 
+@pytest.mark.slow
 def test_the_zip_is_small_and_whole(extension):
     assert extension.stat().st_size < 10e6
     with zipfile.ZipFile(extension) as archive:
@@ -55,6 +63,7 @@ def left_behind(blender):
     return [str(p.relative_to(user)) for p in user.rglob("*") if "arapfields" in str(p.relative_to(user))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("torch", ["without", "before", "after"])
 @pytest.mark.parametrize("blender", blenders.NAMES, indirect=True)
 def test_install_use_and_remove(extension, blender, torch):
@@ -73,12 +82,14 @@ def test_install_use_and_remove(extension, blender, torch):
     assert left_behind(blender) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blender", blenders.NAMES, indirect=True)
 def test_carried_objects_of_all_kinds(extension, blender):
     done = blender.run("installed_carried.py", blender.inside(blender.bring(extension)))
     assert "CARRIED" in done.stdout and "Traceback" not in done.stdout + done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blender", blenders.NAMES[-1:], indirect=True)
 def test_batches_in_blender_itself(extension, blender):
     """As a command of the installed extension and as a script, which skips what the command has done."""
@@ -122,6 +133,7 @@ def test_batches_in_blender_itself(extension, blender):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blender", ["4.5", "4.2"], indirect=True)
 def test_a_repository_serves_the_zip(extension, blender, tmp_path):
     """server-generate's index.json is all that Blender needs to list, fetch and install the extension."""
@@ -135,3 +147,47 @@ def test_a_repository_serves_the_zip(extension, blender, tmp_path):
     done = blender.run("repository.py", f"file://{folder}/index.json")
     assert "SERVED" in done.stdout, done.stdout[-2000:]
     assert left_behind(blender) == []
+
+
+# The modifier, its inputs and copies of modifiers in all versions of Blender, without the library.
+
+
+@pytest.mark.parametrize("name", blenders.VERSIONS)
+def test_the_modifier_works_without_the_library(name, tmp_path):
+    assert "modifier works in" in blenders.find(name, tmp_path).run("modifier_alone.py").stdout
+
+
+# What we write of splats is read by Blender's own importers, where it has splats of its own.
+
+MOTION = (
+    cases.turn([1, 2, 3], 130, (0.2, 0.1, -0.3)) @ cases.shift([0.4, -0.2, 0.1]) @ np.diag([1.5, 1.5, 1.5, 1])
+)
+
+
+@pytest.mark.parametrize("count", [1, 4, 16])
+def test_blenders_own_importers_read_the_same_splats(count, tmp_path):
+    newest = blenders.find(blenders.VERSIONS[-1], tmp_path)
+    posed = splats(500, count).transformed(MOTION)
+    arrays = {"position": posed.centers, "rotation": posed.rotations, "scale": posed.scales}
+    arrays["radiance:base"] = np.column_stack([posed.harmonics[:, 0], posed.opacities])
+    arrays |= {f"radiance:sh_{k - 1}": posed.harmonics[:, k] for k in range(1, count)}
+    np.savez(tmp_path / "posed.npz", **arrays)
+    paths = [tmp_path / f"posed{suffix}" for suffix in splat_files.FRAMED]
+    for path in paths:
+        splat_files.write(path, posed)
+    done = newest.run("imported_splats.py", tmp_path / "posed.npz", *paths)
+    assert "IMPORTED" in done.stdout
+
+
+# A script that registers the add-on in Python's own bpy and simply ends must end.
+
+EXIT_LIMIT = 60  # seconds; it hung for ever where it failed
+SCRIPT = "import bpy, addon; addon.register(); bpy.ops.mesh.primitive_monkey_add(); print('end')"
+
+
+def test_a_script_with_the_addon_ends(user_folder):
+    require_bpy()
+    command = [sys.executable, "-c", SCRIPT]
+    result = subprocess.run(command, env=user_folder, capture_output=True, text=True, timeout=EXIT_LIMIT)
+    assert result.returncode == 0, result.stderr
+    assert "end" in result.stdout

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The result as a modifier: compared with the field applied by hand, wherever it is in the stack."""
+"""The field's modifier: its place in the stack, its copies, and what else uses it."""
+
+import math
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,13 +12,22 @@ from support.blender.stack_list import STACKS
 
 if IN_BLENDER:
     import bpy
+    from mathutils import Matrix, Vector
     from support.blender import scenes
+    from support.blender.baking import animated
+    from support.blender.live import step
+    from support.blender.scenes import FIT
     from support.blender.stacks import build, by_hand, local_points
 
-    from addon.blender import modifier_stack
+    from addon.blender import modifier_kinds, modifier_stack
+    from addon.blender.object_references import source_of
+    from addon.core.runtime import jobs
     from addon.field_modifier import inputs
+    from addon.surface import staleness
 
 pytestmark = pytest.mark.in_blender
+
+# The result as a modifier: compared with the field applied by hand, wherever it is in the stack.
 
 BY_HAND = 1e-5  # single precision of positions of size one, through Blender's modifiers
 
@@ -82,3 +95,309 @@ def test_where_there_are_more_vertices_than_offsets_they_come_from_the_nearest_p
     assert len(bpy.data.objects["Bar_offsets"].data.vertices) < len(rest)
     expected = field(rest)
     assert np.abs(expected - rest).max() > 0.3 and np.abs(moved - expected).max() < 0.02
+
+
+# The result as a modifier: shared meshes, applying, free normals, files.
+
+
+def test_objects_that_share_a_mesh_move_alone():
+    bar, _, moving = scenes.bar_with_handles()
+    other = bpy.data.objects.new("Other", bar.data)
+    bpy.context.collection.objects.link(other)
+    moving.location.z += 0.4
+    rest = local_points(bar)
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    assert other.data == bar.data and np.array_equal(local_points(other), rest)
+    moved = local_points(bar)
+    assert np.abs(moved - rest).max() > 0.3
+    copied = bar.copy()  # as Alt+D does: with the modifier, whose helper it shares
+    bpy.context.collection.objects.link(copied)
+    bpy.context.view_layer.update()
+    assert np.array_equal(local_points(copied), moved)
+    scenes.activate(copied)
+    copied.arapfields.stylize.style = "CYLINDER"
+    bpy.ops.arapfields.stylize(**scenes.QUICK)
+    assert not np.array_equal(local_points(copied), moved) and np.array_equal(local_points(bar), moved)
+    bpy.ops.arapfields.remove_field()
+    assert np.array_equal(local_points(copied), rest) and np.array_equal(local_points(bar), moved)
+    assert len([o for o in bpy.data.objects if "offsets" in o.name]) == 1
+
+
+def test_offsets_of_a_shared_mesh_with_many_attributes_lie_alone():
+    """Blender moves those left when one is removed: what stood for them reads freed memory."""
+    bar, _, moving = scenes.bar_with_handles()
+    scenes.decorate(bar)
+    for domain in ("POINT", "EDGE", "FACE", "CORNER"):
+        for kind in ("FLOAT", "INT", "FLOAT_COLOR", "BYTE_COLOR", "FLOAT_VECTOR", "BOOLEAN", "FLOAT2"):
+            bar.data.attributes.new(f"{domain} {kind}", kind, domain)
+    before = scenes.everything(bar)
+    bpy.context.collection.objects.link(bpy.data.objects.new("Other", bar.data))
+    for z in (0.4, 0.2):
+        moving.location.z = z
+        assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}
+        helper = inputs.get(modifier_stack.find(bar), "Offsets").data
+        names = {one.name for one in helper.attributes if not (one.is_required or one.is_internal)}
+        assert names == {"ARAP Fields"} and scenes.everything(bar) == before
+
+
+@pytest.mark.parametrize("case", ["alone", "mirror before", "shape keys"])
+def test_the_modifier_can_be_applied(case):
+    bar, *_ = build(STACKS[case])
+    moved = local_points(bar)
+    scenes.activate(bar)
+    if case == "mirror before":
+        with pytest.raises(
+            RuntimeError, match=r"Bar has modifiers that change its vertices before \(Mirror\)"
+        ):
+            bpy.ops.arapfields.apply_as_shape_key()
+        bpy.ops.object.modifier_apply(modifier="Mirror")
+        bpy.ops.object.modifier_apply(modifier="ARAP Fields")
+        assert np.array_equal(local_points(bar), moved)
+        return
+    bar.modifiers["ARAP Fields"].show_viewport = False
+    rest = local_points(bar)
+    bar.modifiers["ARAP Fields"].show_viewport = True
+    assert bpy.ops.arapfields.apply_as_shape_key() == {"FINISHED"}
+    assert not bar.modifiers and "ARAP Fields" not in bar.data.attributes
+    assert np.abs(local_points(bar) - moved).max() < 1e-6
+    bar.data.shape_keys.key_blocks["ARAP Fields"].value = 0.0
+    assert np.abs(local_points(bar) - rest).max() < 1e-6
+
+
+def test_replacing_or_keying_supersedes_the_modifier():
+    for target in ("REPLACE", "KEY"):
+        bar, _, moving = scenes.bar_with_handles(f"Bar{target}")
+        bar.modifiers.new("Subdivision", "SUBSURF")
+        moving.location.z += 0.4
+        bpy.ops.arapfields.deform(**scenes.QUICK)
+        moved = local_points(bar)
+        scenes.activate(bar)
+        bpy.ops.arapfields.deform(result=target, **scenes.QUICK)
+        assert [modifier.name for modifier in bar.modifiers] == ["Subdivision"]
+        assert np.abs(local_points(bar) - moved).max() < 1e-5
+
+
+def test_free_normals_turn_with_the_field():
+    if bpy.app.version < (4, 5, 0):
+        pytest.skip("this Blender has no free normals")
+    for domain in ("POINT", "CORNER", "FACE"):
+        bar = scenes.bar(f"Bar{domain}")
+        normals = bar.data.attributes.new("custom_normal", "FLOAT_VECTOR", domain)
+        given = np.random.default_rng(0).normal(size=(len(normals.data), 3)).astype(np.float32)
+        given /= np.linalg.norm(given, axis=1, keepdims=True)
+        normals.data.foreach_set("vector", given.ravel())
+        empty = scenes.cube_empty((0, 0, 0), (2, 2, 2))
+        bpy.context.view_layer.update()
+        scenes.activate(empty, bar)
+        bpy.ops.arapfields.add_handle()
+        turn = Matrix.Rotation(math.radians(40), 4, (1, 2, 3))
+        empty.matrix_world = turn @ empty.matrix_world
+        scenes.activate(bar)
+        bpy.ops.arapfields.deform(**scenes.QUICK | {"iterations": 120})
+        turn = np.array(turn)[:3, :3]
+        assert np.abs(local_points(bar) - np.array([v.co for v in bar.data.vertices]) @ turn.T).max() < 0.03
+        mesh = bar.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+        flat = np.empty(given.size, np.float32)
+        mesh.attributes["custom_normal"].data.foreach_get("vector", flat)
+        assert mesh.attributes["custom_normal"].domain == domain
+        assert np.abs(flat.reshape(-1, 3) - given @ turn.T).max() < 0.1
+
+
+def test_reading_the_shape_leaves_unkeyed_poses_alone():
+    bar, *_ = build(STACKS["armature before"])
+    bone = bar.modifiers["Armature"].object.pose.bones["Second"]
+    bone.keyframe_insert("rotation_euler", frame=1)
+    bpy.context.scene.frame_set(7)
+    bone.rotation_euler.z = 1.1
+    bpy.context.view_layer.update()
+    with modifier_stack.evaluated_mesh(bpy.context, bar, in_place=True) as mesh:
+        seen = max(vertex.co.y for vertex in mesh.vertices)
+    assert abs(bone.rotation_euler.z - 1.1) < 1e-6 and seen > 0.6
+
+
+def test_the_shape_is_read_at_the_scenes_own_time():
+    """However its frames are mapped, also where a modifier after the place has it read from a copy."""
+    bar, scene = scenes.bar(), bpy.context.scene
+    wave = bar.modifiers.new("Wave", "WAVE")
+    wave.height, wave.width, wave.time_offset = 0.3, 1.0, -30.0
+    scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
+    scene.frame_set(41)
+    shown = local_points(bar)
+    bar.modifiers.new("Subdivision", "SUBSURF")
+    with modifier_stack.evaluated_mesh(bpy.context, bar, in_place=True) as mesh:
+        assert np.array_equal([vertex.co for vertex in mesh.vertices], shown)
+
+
+def test_reading_the_shape_leaves_no_users_behind():
+    bar, *_ = scenes.bar_with_handles()
+    named = bpy.data.objects.new("Named", None)
+    modifier = scenes.reading_nodes(bar, named)
+    before = named.users
+    with modifier_stack.mesh_of(bpy.context, bar, []) as mesh:
+        assert len(mesh.vertices) == len(bar.data.vertices)
+    assert named.users == before and inputs.get(modifier, "Goal") == named
+
+
+def test_a_result_brings_no_source_along_when_it_is_appended():
+    bar, *_ = scenes.bar_with_handles()
+    bpy.ops.arapfields.deform(**scenes.NEW)
+    result = bpy.data.objects["Bar_deformed"]
+    assert bpy.context.view_layer.objects.active == result and source_of(bpy.context) == bar
+    assert bar.hide_get() and bar.hide_render
+    bar.name = "Renamed"
+    assert source_of(bpy.context) == bar
+    path = tempfile.mktemp(suffix=".blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path) as (_, into):
+        into.objects = ["Bar_deformed"]
+    assert [item.name for item in bpy.data.objects] == ["Bar_deformed"]
+    bpy.context.collection.objects.link(into.objects[0])
+    scenes.activate(into.objects[0])
+    assert source_of(bpy.context) == into.objects[0]
+
+
+def test_moving_the_modifier_does_not_age_the_fit():
+    bar, _, moving = scenes.bar_with_handles()
+    for name, value in FIT.items():
+        setattr(bar.arapfields.fit, name, value)
+    bpy.ops.arapfields.fit()
+    moving.location.z += 0.4
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    bpy.context.view_layer.update()
+    assert not staleness.reason(bar)
+    bar.data.vertices[0].co.z += 0.1
+    bar.data.update()
+    bpy.context.view_layer.update()
+    assert staleness.reason(bar)
+
+
+@pytest.mark.parametrize("way", ["off", "factor", "keyed"])
+def test_a_modifier_that_shows_nothing_is_named(way):
+    bar, *_ = scenes.bar_with_handles()
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    modifier = bar.modifiers[0]
+    if way == "factor":
+        inputs.put(modifier, "Factor", 0.0)
+    else:
+        modifier.show_viewport = False
+    if way == "keyed":
+        modifier.keyframe_insert("show_viewport", frame=1)
+    said = "The modifier ARAP Fields of Bar is off, or its Factor 0"
+    jobs.board.messages.clear()
+    for press in (lambda: bpy.ops.arapfields.deform(**scenes.QUICK), bpy.ops.arapfields.live):
+        scenes.activate(bar)
+        assert press() == {"FINISHED"}
+    assert [text for level, text in jobs.messages() if level == "WARNING"] == [said] * 2 * (way != "keyed")
+
+
+# Before or after: where the field stands among other modifiers, and what follows it there.
+
+ROOTS = 1e-3  # roots lie within triangles, whose corners the field moves
+
+
+def kinds():
+    """The kinds of modifiers that meshes have."""
+    every = (one.identifier for one in bpy.types.Modifier.bl_rna.properties["type"].enum_items)
+    return [kind for kind in every if not kind.startswith("GREASE_PENCIL")]
+
+
+def test_every_kind_of_this_blender_is_in_the_table():
+    missing = set(kinds()) - set(modifier_kinds.KINDS)
+    assert not missing
+    assert all(kind.why for kind in modifier_kinds.KINDS.values())
+
+
+def added(bar, kind):
+    """The modifier; None where a mesh takes none of that kind."""
+    try:
+        return bar.modifiers.new("Other", kind)
+    except (TypeError, RuntimeError):
+        return None
+
+
+def test_the_field_stands_where_the_table_says():
+    bar, _, moving = scenes.bar_with_handles()
+    moving.location.z += 0.2
+    seen = {}
+    for kind in kinds():
+        bar.modifiers.clear()
+        other = added(bar, kind)
+        if other is None or kind == "NODES":
+            continue
+        place = modifier_stack.place(bar)
+        seen[kind] = place
+        follows = modifier_kinds.KINDS[kind].follows_field and kind not in modifier_stack.ORIGINAL
+        assert place == int(not follows), kind
+        before = len(bar.data.vertices)
+        if modifier_kinds.KINDS[kind].keeps:
+            assert len(local_points(bar)) == before, kind
+    assert {
+        seen[kind] for kind in ("PARTICLE_SYSTEM", "COLLISION", "SURFACE", "MASK", "BUILD", "SUBSURF")
+    } == {0}
+    assert {seen[kind] for kind in ("ARMATURE", "CLOTH", "BOOLEAN", "MIRROR", "UV_PROJECT")} == {1}
+    bar.modifiers.clear()
+    bar.modifiers.new("Fluid", "FLUID").fluid_type = "DOMAIN"
+    assert modifier_stack.place(bar) == 1
+
+
+def hairy(name="Bar"):
+    """A bar whose right end rises from frame 1 to 5, with hair."""
+    bar = animated(name)
+    bar.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    settings = bar.particle_systems[0].settings
+    settings.type, settings.count, settings.hair_length = "HAIR", 60, 0.3
+    bpy.context.scene.frame_set(1)
+    bpy.context.view_layer.update()
+    return bar
+
+
+def roots(bar):
+    """(n, 3) world positions of the hair's roots."""
+    seen = bar.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    hair = seen.particle_systems[0]
+    return np.array([hair.co_hair(seen, particle_no=i, step=0) for i in range(len(hair.particles))])
+
+
+def off(bar):
+    """The largest distance of a root to the skin."""
+    seen = bar.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    local = [bar.matrix_world.inverted() @ Vector(root) for root in roots(bar)]
+    return max((point - seen.closest_point_on_mesh(point)[1]).length for point in local)
+
+
+WAYS = ("MODIFIER", "KEY", "REPLACE", "bake", "live")
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_hair_stays_on_the_skin(way):
+    bar = hairy()
+    before, skin = roots(bar), local_points(bar)
+    bpy.context.scene.frame_set(5)
+    if way == "bake":
+        folder = tempfile.mkdtemp()
+        assert bpy.ops.arapfields.bake(start=1, end=5, filepath=str(Path(folder, "a.pc2"))) == {"FINISHED"}
+        bpy.context.scene.frame_set(5)
+    elif way == "live":
+        assert bpy.ops.arapfields.live() == {"FINISHED"}
+        step(bar)
+    else:
+        assert bpy.ops.arapfields.deform(result=way, **scenes.QUICK) == {"FINISHED"}
+    moved = np.abs(local_points(bar) - skin).max()
+    assert moved > 0.3 and np.abs(roots(bar) - before).max() > 0.8 * moved
+    assert off(bar) < ROOTS
+    assert bar.particle_systems[0].settings.count == 60 and len(bpy.data.particles) == 1
+    assert not any("stays where" in text for _, text in jobs.messages())
+
+
+def test_hair_before_a_modifier_that_makes_the_shape_is_named():
+    bar = hairy()
+    bar.modifiers.new("Mirror", "MIRROR").use_axis = (False, True, False)
+    bpy.context.scene.frame_set(5)
+    assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}
+    assert [m.name for m in bar.modifiers] == ["Hair", "Mirror", "ARAP Fields"]
+    warning = "Bar: Hair stays where the surface was; move it behind the field's modifier"
+    assert ("WARNING", warning) in jobs.messages()
+    path = str(Path(tempfile.mkdtemp(), "a.pc2"))
+    assert bpy.ops.arapfields.bake(start=1, end=2, filepath=path) == {"FINISHED"}
+    assert ("WARNING", f"Bar: {warning}") in jobs.messages() or ("WARNING", warning) in jobs.messages()

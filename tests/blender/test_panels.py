@@ -1,18 +1,36 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every section and menu draws in every state, naming only properties, operators and menus that exist."""
+"""The panels, what they lead to, where users look for them, and their language."""
+
+import fnmatch
+import json
+import string
+import tempfile
+from pathlib import Path
+from urllib.parse import urlparse
+from urllib.request import url2pathname
 
 import pytest
 from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
-    from support.blender import scenes
-    from support.blender.panels import drawn, each_task, prepared
+    from support.blender import scenes, strings
+    from support.blender.panels import Layout, drawn, each_task, prepared
 
     import addon.registration as registration
+    from addon import first_run, menus
+    from addon.blender import guide, language
+    from addon.blender.language import about, translated
+    from addon.blender.translations import read_po, translations
+    from addon.core.errors import UserError
     from addon.core.runtime import jobs
+    from addon.handles import empties
+    from addon.jobs import status_bar
+    from addon.names import Op
 
 pytestmark = pytest.mark.in_blender
+
+# Every section and menu draws in every state, naming only properties, operators and menus that exist.
 
 STATES = [
     "nothing",
@@ -118,3 +136,335 @@ def test_every_grey_button_says_why():
         finally:
             undo()
         assert refused > 0, state
+
+
+# The panel by use: what is in view at first, what a button would refuse, what a fit and a job tell.
+
+
+def test_everyday_sections_come_first_and_numbers_are_under_advanced():
+    prepared("handles")
+    jobs.add_message("INFO", "Bar: done")
+    shown_texts = drawn()
+    jobs.board.messages.clear()
+    panels = {name: getattr(bpy.types, name) for name in shown_texts if "_PT_" in name}
+    first = {n: cls.bl_order for n, cls in panels.items() if not hasattr(cls, "bl_parent_id")}
+    folded = ["carried", "contact", "poses", "animation", "advanced"]
+    order = ["tasks", "handles", "deform", "stylize", "wrap", "skin", *folded, "status"]
+    assert sorted(first, key=first.get) == [f"ARAPFIELDS_PT_{name}" for name in order]
+    closed = {name for name, cls in panels.items() if "DEFAULT_CLOSED" in getattr(cls, "bl_options", ())}
+    assert closed == {*panels} - {*first} | {f"ARAPFIELDS_PT_{name}" for name in folded}
+    jargon = {"Samples", "Iterations", "Handle Weight", "Geometry", "Resolution", "No Limit"}
+    for name, texts in shown_texts.items():
+        if name in first:
+            assert not jargon & {*texts}, name
+    assert jargon <= {text for texts in shown_texts.values() for text in texts}
+
+
+def test_advanced_shows_what_counts_for_the_method_alone():
+    deform = scenes.bar().arapfields.deform
+    for field, fall_off, shown in (("auto", False, set()), ("radial", True, {"Falloff"})):
+        deform.field, deform.exact_handles = field, fall_off
+        texts = {*drawn()["ARAPFIELDS_PT_deform_settings"]}
+        assert texts & {"Falloff", "Network Width", "Start", "Optimizer"} == shown and "Iterations" in texts
+    for field, start in (("neural", True), ("invertible", False)):
+        deform.field = field
+        texts = {*drawn()["ARAPFIELDS_PT_deform_settings"]}
+        assert {"Network Width", "Optimizer"} <= texts and ("Start" in texts) == start
+    deform.field, deform.width = "auto", 64  # which makes the method neural
+    assert "Network Width" in drawn()["ARAPFIELDS_PT_deform_settings"]
+
+
+def test_a_switch_stands_for_zero_and_numbers_go_one_way():
+    style = scenes.bar().arapfields.stylize
+    assert style.sharpness_is_zero and style.sharpness == 0.0
+    style.sharpness_is_zero = False
+    assert style.sharpness == style.sharpness_above_zero == 8.0
+    style.sharpness_above_zero = 0.0  # nearly off, and not automatic
+    assert 0 < style.sharpness < 0.01 and not style.sharpness_is_zero
+    style.sharpness = 9.0  # as scripts and files say it
+    assert style.sharpness_above_zero == 9.0 and not style.sharpness_is_zero
+    for frame, value in ((1, 2.0), (11, 4.0)):
+        style.sharpness_above_zero = value
+        style.keyframe_insert("sharpness_above_zero", frame=frame)
+    bpy.context.scene.frame_set(6)
+    assert 2.5 < style.sharpness < 3.5
+    style.sharpness_is_zero = True
+    assert style.sharpness == 0.0
+
+
+REFUSED = {
+    "no handle": ("ARAPFIELDS_PT_deform", "Drag a pin or add a handle first"),
+    "no group": ("ARAPFIELDS_PT_deform", "Bar has no vertex group gone"),
+    "holds nothing": ("ARAPFIELDS_PT_deform", "No part of the surface lies in the rest region of Far"),
+    "no style object": ("ARAPFIELDS_PT_stylize", "Choose the object that gives the style its normals"),
+    "no axes": ("ARAPFIELDS_PT_stylize", "Choose the object along whose axes the style stands"),
+    "no region": ("ARAPFIELDS_PT_stylize", "Bar has no vertex group gone"),
+    "follows no handle": ("ARAPFIELDS_PT_stylize", "Drag a pin or add a handle first"),
+    "no faces": ("ARAPFIELDS_PT_source", "Bar: the mesh has no faces"),
+    "empty": ("ARAPFIELDS_PT_source", "Bar: the mesh is empty"),
+    "a key of a surface": ("ARAPFIELDS_PT_stylize", "A shape key keeps the mesh"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_a_button_would_refuse_is_said_before(case):
+    bar = scenes.bar()
+    ours = bar.arapfields
+    if case == "no group":
+        bar.vertex_groups.new(name="gone").add([0, 1], 1.0, "REPLACE")
+        bpy.ops.arapfields.add_handle(kind="GROUP", group="gone")
+        bar.vertex_groups.clear()
+    elif case == "holds nothing":
+        scenes.activate(scenes.cube_empty((30, 0, 0), (1, 1, 1), "Far"), bar)
+        bpy.context.view_layer.update()
+        bpy.ops.arapfields.add_handle()
+    elif case == "no style object":
+        ours.stylize.style = "OBJECT"
+    elif case == "no axes":
+        ours.stylize.frame = "EMPTY"
+    elif case == "no region":
+        ours.stylize.region = "gone"
+    elif case == "follows no handle":
+        ours.stylize.use_handles = True
+    elif case in ("no faces", "empty"):
+        points = [] if case == "empty" else [vertex.co for vertex in bar.data.vertices]
+        bar.data.clear_geometry()
+        bar.data.from_pydata(points, [], [])
+    elif case == "a key of a surface":
+        ours.output, ours.result = "SURFACE", "KEY"
+    section, text = REFUSED[case]
+    assert text in " ".join(drawn()[section])
+
+
+def test_what_the_panel_refuses_the_operators_refuse_too():
+    bar = scenes.bar()
+    points = [vertex.co for vertex in bar.data.vertices]
+    bar.data.clear_geometry()
+    bar.data.from_pydata(points, [], [])
+    for operator in ("deform", "stylize", "fit", "extract", "bake", "live"):
+        with pytest.raises(RuntimeError, match="Bar: the mesh has no faces"):
+            getattr(bpy.ops.arapfields, operator)()
+        assert not getattr(bpy.ops.arapfields, operator).poll()
+
+
+def test_a_menu_offers_what_the_mesh_has():
+    bar = scenes.bar()
+    assert not empties.can_place(None, "CUBE", "CURSOR")
+    assert empties.can_place(bar, "CUBE", "CURSOR") and not empties.can_place(bar, "GROUP", "AUTO")
+    bar.vertex_groups.new(name="one")
+    assert empties.can_place(bar, "GROUP", "AUTO")
+    bpy.ops.object.mode_set(mode="EDIT")
+    for action in ("SELECT", "DESELECT"):
+        bpy.ops.mesh.select_all(action=action)
+        assert empties.can_place(bar, "CUBE", "SELECTION") == (action == "SELECT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_a_fit_tells_its_errors():
+    prepared("fitted")
+    texts = drawn()["ARAPFIELDS_PT_surface"]
+    errors = [text for text in texts if "error at the surface" in text]
+    report = json.loads(bpy.data.objects["Bar"].arapfields.fit_report)
+    assert errors == [
+        f"Mean error at the surface: {report['near_mean']:.2g}",
+        f"Largest error at the surface: {report['near_max']:.2g}",
+    ]
+    assert 0 < report["near_mean"] < report["near_max"]
+
+
+def test_the_status_bar_shows_the_job_and_its_cancel():
+    def texts():
+        labels = []
+        status_bar.draw(type("Header", (), {"layout": Layout(labels)})(), bpy.context)
+        return labels
+
+    assert texts() == []
+    undo = prepared("running")
+    try:
+        assert texts() == ["Deform 0%", "Cancel"]
+    finally:
+        undo()
+    assert texts() == []
+    assert status_bar.draw in bpy.types.STATUSBAR_HT_header.draw._draw_funcs
+
+
+@pytest.mark.parametrize("field", ["auto", "radial", "neural"])
+def test_the_fold_barrier_acts_on_every_field(field):
+    _, _, moving = scenes.bar_with_handles()
+    moving.location.x -= 1.2  # the bar is pressed together
+    bpy.context.view_layer.update()
+    shapes = []
+    for barrier in (0.0, 50.0):
+        assert bpy.ops.arapfields.deform(**scenes.QUICK, field=field, barrier=barrier) == {"FINISHED"}
+        shapes.append(scenes.world_points(bpy.data.objects["Bar"]))
+    assert abs(shapes[1] - shapes[0]).max() > 1e-3
+
+
+# Where users look for things: Blender's menus, tooltips, manual pages, a word at the first start.
+
+OPERATORS = (
+    "PIN_TOOL",
+    "PIN_ADD",
+    "ADD_HANDLE",
+    "SET_REST",
+    "RESET_HANDLE",
+    "DEFORM",
+    "LIVE",
+    "STYLIZE",
+    "SKIN",
+    "LIVE_KEEP",
+    "BAKE",
+    "FIT",
+)
+
+
+def test_the_object_menu_has_all_that_the_panel_does():
+    asked = []
+
+    class Noting(Layout):
+        def operator(self, name, **options):
+            asked.append(name)
+            return super().operator(name, **options)
+
+    stand_in = type("Menu", (), {"layout": Noting([])})()
+    menus.ARAPFIELDS_MT_object.draw(stand_in, bpy.context)
+    assert {getattr(Op, name) for name in OPERATORS} <= {*asked}
+    for name, draw in menus.PLACES.items():
+        assert getattr(bpy.types, name).draw._draw_funcs.count(draw) == 1
+        draw(stand_in, bpy.context)
+
+
+def test_an_empty_added_as_a_handle_is_one():
+    bar = scenes.bar()
+    asked = {}
+
+    class Noting:
+        def separator(self):
+            pass
+
+        def operator(self, name, **_):
+            asked["name"] = name
+            asked["properties"] = properties = type("Properties", (), {})()
+            return properties
+
+    menus.draw_in_empties(type("Menu", (), {"layout": Noting()})(), bpy.context)
+    group, name = asked["name"].split(".")
+    getattr(getattr(bpy.ops, group), name)(**vars(asked["properties"]))
+    assert len(bar.arapfields.handles) == 1
+
+
+def test_every_operator_names_its_page_and_every_page_exists():
+    address, patterns = guide.manual_map()
+    folder = Path(url2pathname(urlparse(address).path))
+    assert all((folder / page).is_file() for _, page in patterns)
+
+    def page(name):
+        return next((page for pattern, page in patterns if fnmatch.fnmatchcase(name.lower(), pattern)), None)
+
+    own = [cls for cls in registration.CLASSES if issubclass(cls, bpy.types.Operator)]
+    own = [cls for cls in own if not cls.bl_idname.endswith("_preset")]
+    assert len(own) > 15
+    for cls in own:
+        tooltip = cls.description(bpy.context, None)
+        assert tooltip.startswith(cls.__doc__) and f"Guide: {guide.LABELS[cls.guide]}" in tooltip, cls
+        assert page(f"bpy.ops.{cls.bl_idname}").startswith(cls.guide)
+    assert page("bpy.types.ARAPFIELDS_PG_deform.bending").startswith("deform")
+    assert page("bpy.types.ARAPFIELDS_PG_object.target").startswith("results")
+    assert page("bpy.ops.object.delete") is None
+    assert bpy.utils.manual_map is not None and guide.manual_map in bpy.utils._manual_map
+    guide.end()
+    assert guide.manual_map not in bpy.utils._manual_map
+    guide.begin(registration.CLASSES)
+
+
+def test_the_first_start_says_where_the_extension_is_and_only_the_first():
+    stored = type("Preferences", (), {"was_welcomed": False})()
+    kept = first_run.bpy, first_run.preferences
+    saved = type("Saved", (), {"is_dirty": False})()  # Blender's own, which it saves where they have changed
+    manager = type("Manager", (), {"windows": []})()
+    context = type("C", (), {"window_manager": manager, "preferences": saved})
+    first_run.bpy = type("Bpy", (), {"context": context})
+    first_run.preferences = lambda: stored
+    said = []
+    try:
+        for _ in range(2):
+            first_run.show()
+            said.append(first_run.lines())
+            first_run.welcome.clear()
+    finally:
+        first_run.bpy, first_run.preferences = kept
+    assert "pin tool" in said[0][0] and "press N" in said[0][1] and "F3" in said[0][2] and said[1] == []
+    assert stored.was_welcomed and saved.is_dirty
+    assert bpy.app.background
+
+
+# Every text that a user may read is in the translations, and templates keep their fields.
+
+
+def test_every_text_is_translated():
+    texts = strings.every()
+    assert len(texts) > 250
+
+    def fields(text):
+        return sorted(field for _, field, _, _ in string.Formatter().parse(text) if field)
+
+    tables = translations()
+    assert "de_DE" in tables
+    for language, table in tables.items():
+        missing = [text for text in texts if ("*", text) not in table]
+        assert not missing, (language, missing)
+        stale = {text for _, text in table} - set(texts) - strings.UNTRANSLATED
+        assert not stale, (language, stale)
+        for (_, text), translated in table.items():
+            assert translated and fields(text) == fields(translated), text
+
+
+def test_messages_are_filled_in_after_translation():
+    assert translated("{count} frames baked", count=3) == "3 frames baked"
+    assert translated(UserError("{name} is not a mesh object", name="{x}")) == "{x} is not a mesh object"
+    assert translated(ValueError("as it is")) == "as it is"
+
+
+def test_a_message_names_what_it_is_about_once():
+    lost = UserError("{name} was deleted while it was worked on", name="Bar")
+    said = "Bar was deleted while it was worked on"
+    assert about("Bar", lost) == said and about("Bar", str(lost)) == said
+    assert about("Hat", lost) == f"Hat: {said}"
+    ended = UserError("{error}; live mode ended", error=lost)
+    assert str(ended) == about("Bar", ended) == f"{said}; live mode ended"
+    ended = UserError("{error}; live mode ended", error=ValueError("x"))
+    assert about("Bar", ended) == "Bar: x; live mode ended"
+    other = UserError("The bones of {name} are handles of {source}", name="Rig", source="Bar")
+    assert about("Bar", other) == str(other)
+    assert about("Bar", "Bars were deleted") == "Bar: Bars were deleted"
+
+
+def test_an_error_within_another_is_translated():
+    lookup, german = language._lookup, translations()["de_DE"]
+    language._lookup = lambda text, _: german.get(("*", text), text)
+    try:
+        lost = UserError("{name} was deleted while it was worked on", name="Bar")
+        ended = translated(UserError("{error}; live mode ended", error=lost))
+    finally:
+        language._lookup = lookup
+    assert ended == "Bar wurde während der Arbeit gelöscht; Live-Modus beendet"
+
+
+def test_wrapped_lines_and_every_form_of_a_po_file_are_read():
+    path = Path(tempfile.mkdtemp()) / "de_DE.po"
+    path.write_text(
+        'msgid ""\nmsgstr "Content-Type: text/plain; charset=UTF-8\\n"\n\n'
+        '# a remark\nmsgid ""\n"{name} was deleted "\n"while it was worked on"\n'
+        'msgstr ""\n"{name} wurde gelöscht, "\n"während daran gearbeitet wurde"\n\n'
+        'msgctxt "Operator"\nmsgid "Fit \\"it\\""\nmsgstr "„Anpassen“"\n\n'
+        'msgid "not yet"\nmsgstr ""\n',
+        encoding="utf-8",
+    )
+    texts = read_po(path)
+    assert texts == {
+        "{name} was deleted while it was worked on": "{name} wurde gelöscht, während daran gearbeitet wurde",
+        'Fit "it"': "„Anpassen“",
+    }
+    path.write_text('msgid "a"\nnonsense\nmsgstr "b"\n')
+    with pytest.raises(OSError):
+        read_po(path)

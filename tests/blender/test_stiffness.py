@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Painted stiffness, symmetry, and objects that resist together with the body."""
+"""Vertex groups: painted stiffness, the influence mask, how weights are read."""
+
+import time
 
 import numpy as np
 import pytest
@@ -8,11 +10,20 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
+    from support.blender.baking import RUN, cache_file
     from support.blender.live import step
+    from support.blender.stacks import local_points
 
+    from addon.blender import modifier_stack, vertex_groups
+    from addon.core.errors import UserError
+    from addon.core.runtime.coroutines import run_to_completion
+    from addon.field_modifier import inputs
+    from addon.handles import held_counts
     from addon.live import sessions
 
 pytestmark = pytest.mark.in_blender
+
+# Painted stiffness, symmetry, and objects that resist together with the body.
 
 
 def painted_bar(times=1.0):
@@ -129,3 +140,109 @@ def test_what_goes_together_resists_and_is_held():
         moving.location.z, moving.rotation_euler.y = 0.0, 0.0
         bpy.context.view_layer.update()
     assert np.abs(shapes[0] - shapes[1]).max() > 0.005
+
+
+# The influence mask: a vertex group of the source that every result of the field heeds.
+
+
+def masked_bar():
+    """(bar, moving, rest, masked out): the mask is 1 right of 0, else 0; the right end is pulled up."""
+    bar, _, moving = scenes.bar_with_handles()
+    rest = local_points(bar)
+    bar.vertex_groups.new(name="Face").add(np.flatnonzero(rest[:, 0] > 0.01).tolist(), 1.0, "REPLACE")
+    moving.location.z += 0.4
+    bpy.context.view_layer.update()
+    scenes.activate(bar)
+    return bar, moving, rest, rest[:, 0] < 0.01
+
+
+def test_where_it_is_zero_points_stay_bit_for_bit_whatever_is_solved():
+    bar, _, rest, out = masked_bar()
+    settings = bar.arapfields.stiffness
+    settings.mask = "Face"  # before there is a modifier
+    bpy.ops.arapfields.deform(**RUN)
+    assert np.array_equal(local_points(bar)[out], rest[out]) and np.abs(local_points(bar) - rest).max() > 0.2
+    settings.mask = ""
+    assert np.abs(local_points(bar)[out] - rest[out]).max() > 0.01
+    settings.mask = "Face"
+    assert np.array_equal(local_points(bar)[out], rest[out])
+    bar.modifiers.remove(modifier_stack.find(bar))
+    bpy.ops.arapfields.live()
+    step()
+    assert np.array_equal(local_points(bar)[out], rest[out]) and np.abs(local_points(bar) - rest).max() > 0.2
+    bpy.ops.arapfields.live()
+    bpy.ops.arapfields.bake(start=1, end=2, filepath=cache_file())
+    assert modifier_stack.find_cache(bar).vertex_group == "Face"
+    assert np.array_equal(local_points(bar)[out], rest[out]) and np.abs(local_points(bar) - rest).max() > 0.2
+    settings.mask = ""
+    assert modifier_stack.find_cache(bar).vertex_group == ""
+    bpy.ops.arapfields.deform(**RUN)
+    inputs.put_attribute(modifier_stack.find(bar), "Mask", "Face")  # the user's own, at the modifier
+    bpy.ops.arapfields.deform(**RUN)
+    assert inputs.get_attribute(modifier_stack.find(bar), "Mask") == "Face"
+
+
+def test_a_mask_that_is_gone_is_named():
+    bar, _, rest, _ = masked_bar()
+    bar.arapfields.stiffness.mask = "Face"
+    bar.vertex_groups.remove(bar.vertex_groups["Face"])
+    for call in (lambda: bpy.ops.arapfields.deform(**RUN), bpy.ops.arapfields.live):
+        with pytest.raises(RuntimeError, match="Bar has no vertex group Face"):
+            call()
+    assert np.array_equal(local_points(bar), rest) and len(bar.arapfields.handles) == 2
+
+
+# Vertex groups of large meshes: read in slices, counted aside.
+
+
+def test_weights_of_groups_are_read_in_slices():
+    bar = scenes.decorate(scenes.bar())
+    other = bar.vertex_groups.new(name="Other")
+    other.add([1, 5], 0.25, "REPLACE")
+    expected = np.array([sum(g.weight for g in v.groups if g.group == 0) for v in bar.data.vertices])
+    vertex_groups.BLOCK, block = 50, vertex_groups.BLOCK
+    try:
+        coroutine = vertex_groups.read_weights(bpy.context, bar, ["Other", "Group"])
+        slices = sum(1 for _ in coroutine)
+        assert slices == -(-len(bar.data.vertices) // 50)
+        weights = run_to_completion(vertex_groups.read_weights(bpy.context, bar, ["Other", "Group"]))
+        assert np.array_equal(weights["Group"], expected) and weights["Other"].sum() == 0.5
+        coroutine = vertex_groups.read_weights(bpy.context, bar, ["Group"])
+        next(coroutine)
+        bar.data.clear_geometry()
+        try:
+            run_to_completion(coroutine)
+        except UserError as error:
+            assert "changed while" in str(error)
+        else:
+            raise AssertionError("a changed mesh was read on")
+    finally:
+        vertex_groups.BLOCK = block
+    bar = scenes.decorate(scenes.bar("Second"))
+    bar.modifiers.new("Subdivision", "SUBSURF")
+    bpy.context.view_layer.update()
+    meshes = set(bpy.data.meshes.keys())
+    weights = run_to_completion(vertex_groups.read_weights(bpy.context, bar, ["Group"]))["Group"]
+    assert len(weights) == len(scenes.world_points(bar)) and 0 < weights.max() <= 1
+    assert set(bpy.data.meshes.keys()) == meshes
+
+
+def test_a_window_counts_large_meshes_aside():
+    bar, fixed, _ = scenes.bar_with_handles()
+    scenes.decorate(bar)
+    entries = bar.arapfields.handles
+    bpy.ops.arapfields.add_handle(kind="GROUP", group="Group", place="CURSOR")
+    at_once = [entry.inside for entry in entries]
+    assert min(at_once) > 0
+    for entry in entries:
+        entry.inside = -1
+    held_counts.pending[bar.session_uid] = held_counts.counting(bpy.context, bar)
+    while held_counts.poll_counts() is not None:
+        time.sleep(0.005)
+    assert [entry.inside for entry in entries] == at_once
+    coroutine = held_counts.counting(bpy.context, bar)
+    next(coroutine)
+    bpy.data.objects.remove(fixed)  # between a count and its end
+    held_counts.pending[bar.session_uid] = coroutine
+    while held_counts.poll_counts() is not None:
+        time.sleep(0.005)

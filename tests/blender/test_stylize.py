@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stylizing inside Blender."""
+"""Styles: stylize, live, of objects, and their finish on the mesh."""
 
 import json
 import math
@@ -12,15 +12,22 @@ import arapfields
 
 if IN_BLENDER:
     import bpy
+    from mathutils import Matrix
     from support.blender import scenes
+    from support.blender.live import step
     from support.blender.pins import pin
+    from support.blender.scenes import FIT
     from support.blender.styles import SETTINGS, ball
 
     from addon.core.runtime import jobs
     from addon.core.settings.styles import STYLES, style_identifier, style_name
     from addon.live import sessions
+    from addon.solver import setup, style_object
+    from addon.stylize import ball as picture
 
 pytestmark = pytest.mark.in_blender
+
+# Stylizing inside Blender.
 
 
 def test_a_ball_turns_towards_a_cube_and_keeps_its_mesh():
@@ -167,3 +174,253 @@ def test_what_is_said_of_the_handles_leaves_out_what_pins_keep_at_rest():
     share = float(line.split("within ")[1].split("%")[0]) / 100
     size = np.ptp(points, axis=0).max()
     assert len(errors) == 3 and max(errors[:2]) <= share * size < errors[2]
+
+
+# Live styles, and the implicit surface that follows its handles.
+
+FEW = 600  # samples, of a ball
+SINGLE = 1e-6  # single precision, of a ball of radius 1
+
+
+def test_a_style_follows_its_sliders_without_handles():
+    setup.SAMPLES = FEW
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+    ball = bpy.context.object
+    assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
+
+    def corners():
+        points = scenes.world_points(ball)
+        points = points - points.mean(axis=0)
+        return np.linalg.norm(points, axis=1).max() / np.abs(points).max()
+
+    step(refined=True)
+    cube = corners()
+    assert cube > 1.25
+    ball.arapfields.stylize.strength = 0.0
+    step(refined=True)
+    assert abs(corners() - 1) < 0.05
+    ball.arapfields.stylize.strength, ball.arapfields.stylize.style = 1.0, "OCTAHEDRON"
+    step(refined=True)
+    assert corners() < cube - 0.1
+
+
+def test_handles_and_a_style_together():
+    bar, _, moving = scenes.bar_with_handles()
+    before = scenes.world_points(bar)
+    bar.arapfields.stylize.style, bar.arapfields.stylize.use_handles = "CYLINDER", True
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    moving.location.z += 0.3
+    step()
+    shift = scenes.world_points(bar) - before
+    assert np.abs(shift[before[:, 0] > 0.9].mean(axis=0) - [0, 0, 0.3]).max() < 0.12
+
+
+def test_the_implicit_surface_follows_too():
+    bar, _, moving = scenes.bar_with_handles()
+    for name, value in FIT.items():
+        setattr(bar.arapfields.fit, name, value)
+    bar.arapfields.output, bar.arapfields.resolution = "SURFACE", 40
+    bpy.ops.arapfields.live()
+    result = bpy.data.objects["Bar_live"]
+    before = scenes.world_points(result)
+    assert len(before) != len(bar.data.vertices) and len(result.data.polygons) > 500
+    moving.location.z += 0.3
+    step()
+    shift = scenes.world_points(result) - before
+    assert abs(shift[before[:, 0] > 0.9][:, 2].mean() - 0.3) < 0.05
+
+
+def test_a_live_style_follows_stiffness_rigidity_and_the_fold_barrier():
+    setup.SAMPLES = FEW
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+    ball = bpy.context.object
+    style = ball.arapfields.stylize
+    style.keep_stance = 0.0  # it holds a ball so well that the barrier has nothing to do
+    bpy.ops.arapfields.live(kind="STYLIZE")
+
+    def report():
+        for _ in range(2):  # the first look sets the solver up anew
+            step(refined=True)
+        return sessions.live[ball.session_uid].solver.report
+
+    usual = report()
+    style.rigidity = 50.0
+    assert report()["stretch"] < 0.2 * usual["stretch"]
+    style.rigidity, style.bending = 1.0, 500.0
+    assert report()["bend"] < 0.1 * usual["bend"]
+    style.bending, style.barrier = 0.1, 10.0
+    report()
+    with_barrier = scenes.world_points(ball)
+    style.barrier = 0.0
+    report()
+    assert np.abs(scenes.world_points(ball) - with_barrier).max() > 1e-3
+
+
+def test_live_waits_while_the_object_of_a_style_is_still_to_be_chosen():
+    """What was shown stays until it is, and then follows it."""
+    setup.SAMPLES = FEW
+    bpy.ops.mesh.primitive_cube_add(size=1, location=(5, 0, 0), rotation=(0.5, 0.3, 0))
+    cube = bpy.context.object
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+    ball = bpy.context.object
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    step(refined=True)
+    shown, style = scenes.world_points(ball), ball.arapfields.stylize
+    for choose in (
+        lambda: setattr(style, "style", "OBJECT"),
+        lambda: setattr(style, "style_object", None),
+        lambda: setattr(style, "strength", 0.5),
+    ):
+        choose()
+        step(refined=True)
+        assert sessions.is_live(ball, "STYLIZE") and not jobs.messages()
+        assert np.array_equal(scenes.world_points(ball), shown)
+    style.strength, style.style_object = 1.0, cube
+    step(refined=True)
+    assert sessions.is_live(ball) and np.abs(scenes.world_points(ball) - shown).max() > 0.05
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    style.style, style.frame, style.frame_object = "CUBE", "EMPTY", None
+    with pytest.raises(RuntimeError, match="Choose the object"):  # there is nothing to go on from
+        bpy.ops.arapfields.live(kind="STYLIZE")
+    assert not sessions.is_live(ball)
+
+
+@pytest.mark.parametrize("further", [{}, {"finish": False}, {"strength": 0.5, "style": "OCTAHEDRON"}])
+def test_live_rests_at_what_stylize_makes(further):
+    """The same solve with the same samples: no vertex differs."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+    ball = bpy.context.object
+    ball.data.transform(Matrix.Diagonal((1.0, 0.7, 1.2, 1.0)))
+    style = ball.arapfields.stylize
+    style.samples = FEW
+    for name, value in further.items():
+        setattr(style, name, value)
+    rest = scenes.world_points(ball)
+    bpy.ops.arapfields.live(kind="STYLIZE")
+    step(refined=True)
+    live = scenes.world_points(ball)
+    assert np.abs(live - rest).max() > 0.05
+    assert bpy.ops.arapfields.stylize(result="MODIFIER") == {"FINISHED"}
+    assert not sessions.is_live(ball)
+    assert np.abs(scenes.world_points(ball) - live).max() < SINGLE
+
+
+# Any mesh object as a style.
+
+
+def test_a_ball_as_a_style_changes_nothing_and_an_open_box_is_closed():
+    item = ball()
+    before = scenes.world_points(item)
+    bpy.ops.mesh.primitive_uv_sphere_add(location=(5, 0, 0), radius=0.3)
+    other = bpy.context.object
+    scenes.activate(item)
+    item.arapfields.stylize.style_object = other
+    bpy.ops.arapfields.stylize(style="OBJECT", **SETTINGS)
+    after = scenes.world_points(bpy.data.objects["Ball_stylized"])
+    assert np.abs(after - before).max() < 1e-6
+    bpy.ops.mesh.primitive_cube_add(location=(5, 0, 0))
+    box = bpy.context.object
+    faces = [list(face.vertices) for face in box.data.polygons][1:]
+    corners = [list(vertex.co) for vertex in box.data.vertices]
+    box.data.clear_geometry()
+    box.data.from_pydata(corners, [], faces)
+    scenes.activate(item)
+    item.arapfields.stylize.style_object = box
+    bpy.ops.arapfields.stylize(style="OBJECT", result="NEW", iterations=60, samples=2000)
+    points = scenes.world_points(bpy.data.objects["Ball_stylized"])
+    points -= points.mean(axis=0)
+    assert np.linalg.norm(points, axis=1).max() / np.abs(points).max() > 1.25  # of a ball 1
+
+
+def test_faces_of_a_mesh_opens_as_object():
+    """Files hold a style's number; that of the style which this one took in was the last."""
+    style = ball().arapfields.stylize
+    items = style.bl_rna.properties["style"].enum_items
+    assert items["OBJECT"].value == 15 and len(items) == 16
+    box = bpy.data.objects.new("Box", bpy.data.meshes.new("Box"))
+    style.style, style.style_object = "OBJECT", box
+    assert style.style == "OBJECT"
+
+
+def test_the_picture_of_a_style_object_is_a_ball():
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8)
+    of_ball = picture.picture(style_object.style_of(bpy.context.object)[0])
+    bpy.ops.mesh.primitive_cube_add()
+    of_box = picture.picture(style_object.style_of(bpy.context.object)[0])
+    middle = slice(picture.SIZE // 4, -picture.SIZE // 4)
+    shades = [len(np.unique(np.round(p[middle, middle, 0], 2))) for p in (of_ball, of_box)]
+    assert shades[0] > 30 and np.array_equal(of_ball[..., 3], of_box[..., 3])
+    assert np.median(np.abs(np.diff(of_box[middle, middle, 0], axis=0))) < 1e-6  # flat sides
+    assert np.median(np.abs(np.diff(of_ball[middle, middle, 0], axis=0))) > 1e-3
+
+
+# Stylize finishes on the mesh: wherever the result goes, but not where a field alone is wanted.
+
+EXACT = 1e-6  # single precision, of a ball of radius 1
+
+
+def angle(points, item):
+    """The mean angle in degrees of triangles to the nearest axis, by area."""
+    item.data.calc_loop_triangles()
+    corners = points[np.array([triangle.vertices for triangle in item.data.loop_triangles])]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    cosines = np.abs(normals / areas[:, None]).max(axis=1)
+    return np.average(np.degrees(np.arccos(np.clip(cosines, 0, 1))), weights=areas)
+
+
+def stylized(name, result="MODIFIER", prepare=lambda item: None, **further):
+    """A ball, and its (n, 3) points after Stylize."""
+    item = ball(name)
+    prepare(item)
+    bpy.ops.arapfields.stylize(**{**SETTINGS, "style": "CUBE", "result": result, **further})
+    return item, scenes.world_points(bpy.data.objects[f"{name}_stylized"] if result == "NEW" else item)
+
+
+def both(**further):
+    """A ball, and its points with and without the finish."""
+    _, finished = stylized("Finished", **further)
+    item, field_alone = stylized("Plain", finish=False, **further)
+    return item, finished, field_alone
+
+
+@pytest.mark.parametrize("result", ["MODIFIER", "NEW", "KEY", "REPLACE"])
+def test_the_finish_brings_every_result_nearer_to_the_style(result):
+    item, finished, field_alone = both(result=result)
+    assert angle(finished, item) < 0.7 * angle(field_alone, item)
+
+
+def test_with_contact_the_field_stays():
+    def on_ground(item):
+        item.location.z = 1.0
+        contact = item.arapfields.contact
+        contact.use = contact.use_ground = True
+
+    _, finished, field_alone = both(prepare=on_ground, width=256, layers=4, batch=500)  # of the fast method
+    assert np.array_equal(finished, field_alone)
+
+
+def test_what_the_region_leaves_out_stays_where_the_field_has_it():
+    def of_upper_half(item):
+        group = item.vertex_groups.new(name="Upper")
+        group.add([v.index for v in item.data.vertices if v.co.z > 0.2], 1.0, "REPLACE")
+        item.arapfields.stylize.region = "Upper"
+
+    item, finished, field_alone = both(prepare=of_upper_half)
+    low = np.array([vertex.co.z < 0.2 for vertex in item.data.vertices])
+    away = np.linalg.norm(finished - field_alone, axis=1)
+    assert away[low].max() < EXACT < 0.02 < away.max()
+
+
+def test_what_handles_hold_stays_where_the_field_has_it():
+    def with_a_handle(item):
+        above = scenes.cube_empty((0, 0, 1), (1, 1, 0.4))
+        scenes.activate(above, item)
+        bpy.ops.arapfields.add_handle()
+        scenes.activate(item)
+        item.arapfields.stylize.use_handles = True
+
+    item, finished, field_alone = both(prepare=with_a_handle)
+    high = np.array([vertex.co.z > 0.6 for vertex in item.data.vertices])
+    away = np.linalg.norm(finished - field_alone, axis=1)
+    assert away[high].max() < EXACT < 0.02 < away.max()

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wrapping an object onto another inside Blender: what moves, what stays, what is refused."""
+"""Wraps: landmarks, sequences of scans, garments refitted."""
 
+import tempfile
 import types
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -11,17 +15,29 @@ import arapfields as af
 
 if IN_BLENDER:
     import bpy
+    from mathutils import Matrix
     from support.blender import character, scenes, wraps
-    from support.blender.character import seen_mesh
+    from support.blender.baking import EXACT, at, cache_file, cancelled_at, stepped
+    from support.blender.character import link, seen_mesh
     from support.blender.wraps import SMALL, bar_and_target, joints, rigged_bar, soup_of
+    from support.geometry import wrap_cases as cases
+    from support.geometry.characters import Capsules
 
+    import arapfields as af
+    from addon.animation.operators import ARAPFIELDS_OT_wrap_sequence
     from addon.blender import mesh_arrays, modifier_stack
+    from addon.blender.object_references import ObjectReference
     from addon.core.geometry.spaces import space_of
     from addon.core.runtime import jobs
     from addon.field_modifier import inputs
+    from addon.handles.empties import matrix_of
     from addon.wrap import landmarks
+    from addon.wrap.clicking import ARAPFIELDS_OT_click_landmarks as Operator
+    from arapfields.cli import contact_sheet
 
 pytestmark = pytest.mark.in_blender
+
+# Wrapping an object onto another inside Blender: what moves, what stays, what is refused.
 
 ALIKE = 0.05  # between wraps from samples of the mesh and of its implicit surface, in units of the scene
 ROUNDED = 0.2  # what a coarse grid takes off an object of three units
@@ -272,3 +288,447 @@ def test_a_remeshed_wrap_lies_where_the_warped_one_lies(output):
         np.abs(other_points.min(axis=0) - low).max() < 0.2
         and np.abs(other_points.max(axis=0) - high).max() < 0.2
     )
+
+
+# Many wraps inside Blender: a template that follows a scanned motion, and pages of pictures.
+
+OFF = 0.01  # of the diagonal, on average: few centers and samples
+RATES = (0.0, 0.1, 0.2, 0.3)  # at which the scan is bent in frames 2, 4, 6 and 8
+
+
+def add_mesh(name, vertices, faces, collection=None):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices.tolist(), [], faces.tolist())
+    item = bpy.data.objects.new(name, mesh)
+    (collection or bpy.context.collection).objects.link(item)
+    return item
+
+
+def template():
+    """A coarse figure that lies elsewhere, scaled unevenly, with a material."""
+    item = add_mesh("Template", *cases.figure(2))
+    item.location, item.scale = (0.1, 0, 0), (1.1, 1, 1)
+    item.data.materials.append(bpy.data.materials.new("Skin"))
+    for name, value in SMALL.items():
+        setattr(item.arapfields.wrap, name, value)
+    scenes.activate(item)
+    return item
+
+
+def bent(rate):
+    return cases.bend(cases.figure(3)[0], rate)
+
+
+def scans(missing=(), empty=()):
+    """A template whose frames are scans in a collection, which a layer does not show."""
+    item, faces = template(), cases.figure(3)[1]
+    item.arapfields.wrap.frames = home = bpy.data.collections.new("Scans")
+    bpy.context.scene.collection.children.link(home)
+    bpy.context.view_layer.layer_collection.children["Scans"].exclude = True
+    for number, rate in zip((2, 4, 6, 8), RATES, strict=True):
+        if number in empty:
+            add_mesh(f"scan_{number}", np.empty((0, 3)), np.empty((0, 3), int), home)
+        elif number not in missing:
+            add_mesh(f"scan_{number}", bent(rate), faces, home)
+    return item
+
+
+def off(item, frame, rate):
+    """Mean distance of an object at a frame from the scan that is bent so, in diagonals of that."""
+    at(item, frame)
+    away = af.MeshSdf(bent(rate), cases.figure(3)[1])(scenes.world_points(item))
+    return np.abs(away).mean() / np.linalg.norm(np.ptp(bent(rate), axis=0))
+
+
+def test_a_template_follows_a_collection_and_names_what_is_missing():
+    item = scans(missing=(4,), empty=(6,))
+    path = cache_file()
+    bpy.context.scene.frame_set(3)
+    assert bpy.ops.arapfields.wrap_sequence(filepath=path) == {"FINISHED"}
+    assert bpy.context.scene.frame_current == 3
+    assert [m.type for m in item.modifiers] == ["MESH_CACHE"]
+    assert off(item, 2, 0.0) < OFF and off(item, 8, 0.3) < OFF
+    assert np.array_equal(at(item, 4), at(item, 2)) and np.array_equal(at(item, 6), at(item, 2))
+    said = dict(reversed(pair) for pair in jobs.messages())
+    assert "Template: Frame 4: There is no mesh; held" in said, said
+    assert "Template: Frame 6: scan_6: the mesh is empty; held" in said, said
+    assert any("4 frames of 66 points baked" in text and "at worst, in frame" in text for text in said), said
+    assert bpy.ops.arapfields.remove_bake() == {"FINISHED"} and not item.modifiers
+
+
+def test_bad_frames_at_the_beginning_have_the_first_good_shape():
+    item = scans(empty=(2, 4))
+    assert bpy.ops.arapfields.wrap_sequence(filepath=cache_file()) == {"FINISHED"}
+    assert np.array_equal(at(item, 2), at(item, 6)) and np.array_equal(at(item, 4), at(item, 6))
+    assert off(item, 6, 0.2) < OFF and off(item, 8, 0.3) < OFF
+    said = {text for _, text in jobs.messages()}
+    assert "Template: Frame 2: scan_2: the mesh is empty; held" in said, said
+
+
+def test_a_pose_does_not_add_to_what_is_scanned():
+    """Wrapped once, the field stands before the armature; a scan has its own pose."""
+    item, rig = rigged_bar()
+    for name, value in SMALL.items():
+        setattr(item.arapfields.wrap, name, value)
+    target = soup_of(item)
+    item.arapfields.wrap.onto = target
+    assert bpy.ops.arapfields.wrap() == {"FINISHED"}
+    rig.pose.bones["Upper"].rotation_mode = "XYZ"
+    rig.pose.bones["Upper"].rotation_euler.x = 0.8
+    assert bpy.ops.arapfields.wrap_sequence(filepath=cache_file(), start=1, end=1) == {"FINISHED"}
+    assert [m.type for m in item.modifiers if m.show_viewport] == ["ARMATURE", "MESH_CACHE"]
+    goal = scenes.world_points(target)
+    triangles = np.arange(len(goal)).reshape(-1, 3).astype(np.int32)
+    away = np.abs(af.MeshSdf(goal, triangles)(scenes.world_points(item))).mean()
+    assert away < OFF * np.linalg.norm(np.ptp(goal, axis=0))
+
+
+def test_a_target_that_changes_is_followed_into_shape_keys():
+    item, target = template(), add_mesh("Scan", *cases.figure(3))
+    item.arapfields.wrap.onto = target
+    target.shape_key_add(name="Basis")
+    key = target.shape_key_add(name="Bent")
+    for point, place in zip(key.data, bent(0.3), strict=True):
+        point.co = place
+    for frame, value in ((1, 0.0), (3, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+    before = at(item, 1)
+    assert bpy.ops.arapfields.wrap_sequence(format="KEYS", range="HANDLES") == {"FINISHED"}
+    baked = bpy.data.objects["Template_baked"]
+    assert [k.name for k in baked.data.shape_keys.key_blocks[1:]] == ["frame 1", "frame 2", "frame 3"]
+    assert off(baked, 1, 0.0) < OFF and off(baked, 3, 0.3) < OFF
+    assert np.array_equal(at(item, 1), before) and baked.data.materials[0].name == "Skin"
+
+
+def test_a_cancelled_sequence_leaves_nothing():
+    item = scans()
+    kept = scenes.everything(item)
+    operator = stepped(ARAPFIELDS_OT_wrap_sequence, filepath=cache_file())
+    assert cancelled_at(operator, "frame 4") == {"CANCELLED"}
+    assert operator.said == "Wrap Sequence cancelled"
+    assert scenes.everything(item) == kept and not item.modifiers
+
+
+def wrapped_frames(**given):
+    """How many of its frames a sequence wraps: of the others it does not look at the scan's distances."""
+    with patch.object(af, "MeshSdf", side_effect=af.MeshSdf) as made:
+        assert bpy.ops.arapfields.wrap_sequence(**given) == {"FINISHED"}
+    return made.call_count
+
+
+def played(item):
+    return [at(item, frame).tolist() for frame in (2, 4, 6, 8)]
+
+
+@pytest.mark.parametrize("kept", ["cache", "keys"])
+def test_a_stopped_sequence_goes_on_as_if_it_had_not_been(kept):
+    item = scans()
+    given = {"filepath": cache_file()} if kept == "cache" else {"format": "KEYS"}
+    assert cancelled_at(stepped(ARAPFIELDS_OT_wrap_sequence, **given), "frame 6") == {"CANCELLED"}
+    count = wrapped_frames(**given)
+    assert 1 <= count <= 2
+    said = " ".join(text for _, text in jobs.messages())
+    assert f"{4 - count} frames were there already" in said, said
+    shown = played(item if kept == "cache" else bpy.data.objects["Template_baked"])
+    scenes.activate(item)
+    assert wrapped_frames(filepath=cache_file()) == 4
+    assert np.abs(np.subtract(played(item), shown)).max() < EXACT
+
+
+@pytest.mark.parametrize(("edited", "redone"), [(8, 1), (4, 3)])
+def test_an_edited_frame_is_wrapped_again_with_those_behind_it(edited, redone):
+    path, clothes = Path(cache_file()), scenes.bar("Clothes")
+    item, file = scans(), str(path.with_name("scene.blend"))
+    item.arapfields.carried.add().item = clothes
+    assert wrapped_frames(filepath=str(path)) == 4
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    item, clothes = bpy.data.objects["Template"], bpy.data.objects["Clothes"]
+    scenes.activate(item)
+    for vertex, place in zip(bpy.data.objects[f"scan_{edited}"].data.vertices, bent(0.12), strict=True):
+        vertex.co = place
+    assert wrapped_frames(filepath=str(path)) == redone
+    assert off(item, edited, 0.12) < OFF
+    shown, other = (played(item), played(clothes)), cache_file()
+    assert wrapped_frames(filepath=other) == 4
+    assert (played(item), played(clothes)) == shown and Path(other).read_bytes() == path.read_bytes()
+
+
+def test_what_has_no_frames_is_refused():
+    item = template()
+    with pytest.raises(RuntimeError, match="Choose the object to wrap Template onto"):
+        bpy.ops.arapfields.wrap_sequence(format="KEYS")
+    item.arapfields.wrap.frames = home = bpy.data.collections.new("Scans")
+    with pytest.raises(RuntimeError, match="Scans has no mesh for these frames"):
+        bpy.ops.arapfields.wrap_sequence(format="KEYS")
+    add_mesh("scan_1", np.empty((0, 3)), np.empty((0, 3), int), home)
+    with pytest.raises(RuntimeError, match="Frame 1: scan_1: the mesh is empty"):
+        bpy.ops.arapfields.wrap_sequence(format="KEYS")
+
+
+def test_names_without_numbers_are_in_order_and_a_setting_wraps_all_anew():
+    item = template()
+    item.arapfields.wrap.frames = home = bpy.data.collections.new("Scans")
+    for name, rate in (("Scan.001", 0.2), ("Scan", 0.0)):
+        add_mesh(name, bent(rate), cases.figure(3)[1], home)
+    bpy.context.scene.frame_start = 10
+    path = cache_file()
+    assert wrapped_frames(filepath=path) == 2
+    assert off(item, 10, 0.0) < OFF and off(item, 11, 0.2) < OFF
+    assert wrapped_frames(filepath=path) == 0
+    item.arapfields.wrap.closeness = 0.5  # another setting wraps all anew
+    assert wrapped_frames(filepath=path) == 2
+
+
+def test_a_page_shows_what_is_wrapped_the_worst_first():
+    item, target = bar_and_target()
+    other, plain = scenes.bar("Loose"), scenes.bar("Plain")
+    other.arapfields.wrap.onto = target
+    for one, closeness in ((item, 1.0), (other, 0.01)):
+        scenes.activate(one)
+        assert bpy.ops.arapfields.wrap(closeness=closeness, **SMALL) == {"FINISHED"}
+    scenes.activate(plain, item, other)
+    with pytest.raises(RuntimeError, match="Save the"):
+        bpy.ops.arapfields.wrap_sheet()
+    path, drawn, cell = Path(tempfile.mkdtemp()) / "wraps.html", [], contact_sheet.cell
+    contact_sheet.cell = lambda *given: drawn.append(given[2:]) or cell(*given)
+    assert bpy.ops.arapfields.wrap_sheet(filepath=str(path), scope="SELECTED") == {"FINISHED"}
+    contact_sheet.cell = cell
+    for wrapped, there in drawn:
+        assert np.abs(af.MeshSdf(*there)(wrapped[0])).mean() < 0.02
+    page = path.read_text()
+    assert 0 < page.index("<b>Loose, Scan</b>") < page.index("<b>Bar, Scan</b>") and "Plain" not in page
+    assert page.count("of the target's size off".replace("'", "&#x27;")) == page.count("<img") == 2
+    assert any(text.startswith("Wrap Plain first") for _, text in jobs.messages()), jobs.messages()
+    with pytest.raises(RuntimeError, match=r"Error: .*gone.html: \w"):
+        bpy.ops.arapfields.wrap_sheet(filepath=str(path / "gone.html"))
+
+
+# Landmarks by click, driven by stand-ins for a 3D view and its mouse: a pixel is a hundredth of a unit.
+
+
+def clicker():
+    """(item, click) of a bar and a target 3 units to its right, seen from the front.
+
+    `click(x, z)`, in units, gives what the modal operator answers and the halves of a pair that it has.
+    """
+    target = scenes.bar("Scan")
+    target.location.x = 3
+    item = scenes.bar()
+    item.arapfields.wrap.onto = target
+    bpy.context.view_layer.update()
+    names = ("modal", "click", "struck", "take_back", "tell", "end")
+    operator = type("Clicker", (), {name: vars(Operator)[name] for name in names})()
+    operator.ends, operator.clicked, operator.report = (
+        [ObjectReference(item), ObjectReference(target)],
+        {},
+        print,
+    )
+    turn = Matrix(((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, -10), (0, 0, 0, 1)))
+    flat = Matrix.Diagonal((0.2, 0.2, -0.01, 1)) @ turn
+    view = SimpleNamespace(
+        view_matrix=turn, perspective_matrix=flat, is_perspective=False, view_perspective="ORTHO"
+    )
+    whole = SimpleNamespace(type="WINDOW", x=0, y=0, width=1000, height=1000)
+    sidebar = SimpleNamespace(type="UI", x=850, y=0, width=150, height=1000)
+    space = SimpleNamespace(region_3d=view, show_gizmo=True, show_gizmo_navigate=True)
+    area = SimpleNamespace(
+        regions=[whole, sidebar],
+        spaces=SimpleNamespace(active=space),
+        header_text_set=print,
+        tag_redraw=print,
+    )
+    context = SimpleNamespace(
+        area=area,
+        scene=bpy.context.scene,
+        evaluated_depsgraph_get=bpy.context.evaluated_depsgraph_get,
+        collection=bpy.context.collection,
+        view_layer=bpy.context.view_layer,
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+    )
+
+    def click(x, z):
+        event = SimpleNamespace(type="LEFTMOUSE", value="PRESS", mouse_x=500 + 100 * x, mouse_y=500 + 100 * z)
+        return operator.modal(context, event), sorted(operator.clicked)
+
+    return item, click
+
+
+def test_a_click_just_beside_the_surface_takes_its_edge():
+    item, click = clicker()
+    assert click(-1.08, 0.0) == ({"RUNNING_MODAL"}, [0])
+    assert click(3.0, 0.33) == ({"RUNNING_MODAL"}, [])
+    (pair,) = item.arapfields.wrap.landmarks
+    ends = [end.matrix_world.translation for end in (pair.rest, pair.on_target)]
+    assert np.abs(ends[0].x + 1) < 0.05 and np.abs(ends[1].z - 0.25) < 0.05
+
+
+def test_a_click_on_neither_selects_nothing_and_the_sidebar_has_its_own():
+    _, click = clicker()
+    assert click(1.5, 0.0) == ({"RUNNING_MODAL"}, [])  # between the two
+    assert click(3.8, 0.0) == ({"PASS_THROUGH"}, [])  # the sidebar lies over the target
+    assert click(3.0, 4.0) == ({"PASS_THROUGH"}, [])  # the gizmos of navigation
+
+
+def test_landmarks_are_mirrored_once():
+    source, target = scenes.bar(), scenes.bar()
+    target.location.x = 4.0
+    scenes.activate(source)
+    source.arapfields.wrap.onto = target
+    bpy.context.view_layer.update()
+    for x in (0.0, 0.8):
+        bpy.ops.arapfields.add_landmark(rest=(x, 0, 0.25), on_target=(4 + x, 0, 0.25))
+    pairs = source.arapfields.wrap.landmarks
+    for _ in range(2):
+        assert bpy.ops.arapfields.mirror_landmarks() == {"FINISHED"} and len(pairs) == 3
+    ends = [round(end.matrix_world.translation.x, 3) for end in (pairs[2].rest, pairs[2].on_target)]
+    assert ends == [-0.8, 3.2] and len({tuple(pair.colour) for pair in pairs}) == 3
+
+
+# Garments of one body refitted to another, whose twins are known: both bodies are one shape, mapped.
+
+PARTS = [
+    ((0, 0, 0.75), (0, 0, 1.25), 0.17),
+    ((0, 0, 1.3), (0, 0, 1.55), 0.11),
+    *(((side * 0.1, 0, 0.1), (side * 0.09, 0, 0.8), 0.08) for side in (-1, 1)),
+    *(((side * 0.15, 0, 1.2), (side * 0.65, 0, 1.15), 0.055) for side in (-1, 1)),
+]
+AWAY, GAP = 0.02, 0.002  # of garments from the skin; least
+CLOSE = 0.03  # of the body's size
+
+
+def mapped(points):
+    """The other body's place of a point of the first: wider, longer, leaning."""
+    x, y, z = np.asarray(points, float).T
+    return np.column_stack([1.15 * x * (1 + 0.1 * z), 1.3 * y + 0.05 * z * z, 1.12 * z])
+
+
+def surface(offset=0.0):
+    parts = [(start, end, radius + offset) for start, end, radius in PARTS]
+    return af.extract_surface(Capsules(parts, af.Frame([0, 0, 0.85], 1.0)), resolution=64)[:2]
+
+
+def mesh_object(name, vertices, triangles):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(np.asarray(vertices).tolist(), [], np.asarray(triangles).tolist())
+    return link(name, mesh)
+
+
+def garment(name, inside):
+    """(object, its vertices) of the offset surface where `inside` holds, with weights, a key, a material."""
+    vertices, triangles = surface(AWAY)
+    triangles = triangles[inside(vertices)[triangles].all(axis=1)]
+    used, flat = np.unique(triangles, return_inverse=True)
+    vertices = vertices[used]
+    item = mesh_object(name, vertices, flat.reshape(-1, 3))
+    item.data.materials.append(bpy.data.materials.new(f"{name} Cloth"))
+    group = item.vertex_groups.new(name="Upper")
+    for index, height in enumerate(vertices[:, 2]):
+        group.add([index], float(np.clip(height, 0, 1)), "REPLACE")
+    item.shape_key_add(name="Basis")
+    key = item.shape_key_add(name="Long")
+    mesh_arrays.put_vectors(key.data, longer(vertices), "co")
+    return item, vertices
+
+
+def longer(vertices):
+    low = vertices[:, 2].min()
+    return vertices - np.column_stack(
+        [*np.zeros((2, len(vertices))), 0.1 * np.exp(-8 * (vertices[:, 2] - low))]
+    )
+
+
+def scene():
+    """(body, other, {name: (garment, vertices)})"""
+    vertices, triangles = surface()
+    body = mesh_object("Ada", vertices, triangles)
+    other = mesh_object(
+        "Bea", mapped(vertices), triangles[np.random.default_rng(0).permutation(len(triangles))]
+    )
+    other.location = (2.0, 0.5, 0.0)
+    bpy.context.view_layer.update()
+    body.arapfields.wrap.onto, body.arapfields.wrap.samples = other, 4000
+    for place in (
+        [0, 0, 1.66],
+        [0.7, 0, 1.15],
+        [-0.7, 0, 1.15],
+        [0.1, 0, 0.02],
+        [-0.1, 0, 0.02],
+        [0, -0.17, 1.0],
+    ):
+        nearest = vertices[((vertices - place) ** 2).sum(axis=1).argmin()]
+        landmarks.add(
+            bpy.context, body, other, (nearest, mapped(nearest[None])[0] + np.array(other.location))
+        )
+    worn = {
+        "Shirt": lambda p: (p[:, 2] > 0.85) & (p[:, 2] < 1.3) & (np.abs(p[:, 0]) < 0.4),
+        "Trousers": lambda p: (p[:, 2] > 0.15) & (p[:, 2] < 0.9),
+        "Cap": lambda p: p[:, 2] > 1.5,
+    }
+    return body, other, {name: garment(name, inside) for name, inside in worn.items()}
+
+
+def points_of(block):
+    return mesh_arrays.vectors(block.data, "co").astype(float)
+
+
+def inside(other, copied):
+    solid = af.MeshSdf(scenes.world_points(other), mesh_arrays.triangles(other.data))
+    return solid(scenes.world_points(copied))
+
+
+def test_garments_fit_the_other_body_as_their_known_twins_do(tmp_path):
+    body, other, worn = scene()
+    field = tmp_path / "Ada to Bea.safetensors"
+    scenes.activate(*(worn[name][0] for name in ("Shirt", "Trousers")), body)
+    assert bpy.ops.arapfields.refit(gap=GAP, field=str(field)) == {"FINISHED"}
+    assert field.exists()
+    written = field.read_bytes()
+    scenes.activate(worn["Cap"][0], body)
+    assert bpy.ops.arapfields.refit(gap=GAP, field=str(field)) == {"FINISHED"}
+    assert field.read_bytes() == written
+    size = np.linalg.norm(np.ptp(scenes.world_points(other), axis=0))
+    for name, (item, vertices) in worn.items():
+        copied = bpy.data.objects[f"{name} Bea"]
+        assert inside(other, copied).min() > 0.99 * GAP, name
+        twin = mapped(vertices) + np.array(other.location)
+        off = np.linalg.norm(scenes.world_points(copied) - twin, axis=1)
+        assert off.mean() < CLOSE * size and np.percentile(off, 99) < 2 * CLOSE * size, (
+            name,
+            off.mean() / size,
+        )
+        keys = copied.data.shape_keys.key_blocks
+        assert [key.name for key in keys] == ["Basis", "Long"]
+        way = (points_of(keys[1]) - points_of(keys[0])) @ np.array(matrix_of(copied))[:3, :3].T
+        wanted = mapped(longer(vertices)) - mapped(vertices)
+        assert np.abs(way - wanted).max() < CLOSE * size
+        assert np.linalg.norm(way - wanted) < 0.2 * np.linalg.norm(wanted), name
+        assert [group.name for group in copied.vertex_groups] == ["Upper"]
+        given, got = ([one.groups[0].weight for one in data.vertices] for data in (item.data, copied.data))
+        assert given == got and copied.data.materials[0] == item.data.materials[0]
+        assert copied.parent == other and copied.data != item.data
+        assert np.abs(scenes.world_points(item) - vertices).max() < 1e-6
+
+
+def test_a_second_run_moves_the_first_ones_copies_and_another_field_is_refused(tmp_path):
+    body, other, worn = scene()
+    shirt = worn["Shirt"][0]
+    given = {"field": str(tmp_path / "a.safetensors")}
+    for _ in range(2):
+        scenes.activate(shirt, body)
+        assert bpy.ops.arapfields.refit(**given) == {"FINISHED"}
+    assert sorted(one.name for one in bpy.data.objects if one.name.startswith("Shirt")) == [
+        "Shirt",
+        "Shirt Bea",
+    ]
+    other.location.x += 1.0
+    scenes.activate(shirt, body)
+    with pytest.raises(RuntimeError, match="is of other bodies"):
+        bpy.ops.arapfields.refit(**given)
+    scenes.activate(body)
+    with pytest.raises(RuntimeError, match="Select the garments too"):
+        bpy.ops.arapfields.refit()
+    scenes.activate(shirt, body)
+    with pytest.raises(RuntimeError, match="needs the extension"):
+        bpy.ops.arapfields.refit(field=str(tmp_path / "a.txt"))
