@@ -3,7 +3,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/python_function.h"
-#include "solve/contact.h"
+#include "solve/contact/contact.h"
 
 namespace arapfields::python {
 

@@ -7,7 +7,7 @@
 #include "energies/distortion.h"
 #include "optimize/iteration.h"
 #include "optimize/loop_result.h"
-#include "solve/contact.h"
+#include "solve/contact/contact.h"
 
 namespace arapfields::python {
 

@@ -50,7 +50,7 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
   terms.stiffness = SurfaceStiffness(samples, options.surface);
   terms.barrier = options.surface.barrier;
   terms.barrier_threshold = options.surface.barrier_threshold;
-  terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
+  terms.handles = bound_handles(handles, samples);
   require_within_reach(terms.handles, samples.points);
   terms.pull = options.handles;
   terms.locality.options = options.locality;
@@ -70,7 +70,7 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
 /// A radial field blended with the handles' motions, stored as a neural field whose network is zero.
 Solution exact_radial(const SurfaceSamples& samples, const std::vector<Handle>& handles,
                       const DeformOptions& options, const Progress& progress, const SolveHooks& hooks) {
-  const BoundHandles bound(in_cube(handles, samples.frame), samples.points);
+  const BoundHandles bound = bound_handles(handles, samples);
   std::vector<std::string> warnings;
   ExactHandles exact{exact_blend(bound, options.margin, warnings), {}};
   exact.around = [&](std::shared_ptr<const DeformationField> inside) {

@@ -4,7 +4,7 @@
 #include "energies/external_energy.h"
 #include "energies/term.h"
 #include "optimize/iteration.h"
-#include "solve/contact.h"
+#include "solve/contact/contact.h"
 
 namespace arapfields {
 

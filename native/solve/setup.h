@@ -32,4 +32,9 @@ inline std::vector<Handle> in_cube(const std::vector<Handle>& handles, const Fra
   return result;
 }
 
+/// Handles of mesh coordinates, bound to samples in their cube.
+inline BoundHandles bound_handles(const std::vector<Handle>& handles, const SurfaceSamples& samples) {
+  return BoundHandles(in_cube(handles, samples.frame), samples.points);
+}
+
 }  // namespace arapfields

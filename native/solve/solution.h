@@ -11,7 +11,7 @@
 #include "energies/distortion.h"
 #include "fields/field.h"
 #include "optimize/loop_result.h"
-#include "solve/contact.h"
+#include "solve/contact/contact.h"
 
 namespace arapfields {
 

@@ -67,8 +67,7 @@ Solution stylize(const SurfaceSamples& samples, const Style& style, const Styliz
   terms.external = hooks.energies;
   terms.further = hooks.terms;
   const Handle lowest = lowest_point(samples, up);
-  terms.handles = handles.empty() ? BoundHandles({lowest}, samples.points)
-                                  : BoundHandles(in_cube(handles, samples.frame), samples.points);
+  terms.handles = handles.empty() ? BoundHandles({lowest}, samples.points) : bound_handles(handles, samples);
   require_within_reach(terms.handles, samples.points);
   terms.weights = energy_weights(samples, terms.handles);
   terms.pull = options.handles;

@@ -18,14 +18,14 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "distance/mesh_sdf.h"
-#include "energies/contact.h"
 #include "energies/styles.h"
 #include "implicit_shapes.h"
 #include "mesh/sample_mesh.h"
 #include "shapes.h"
+#include "solve/contact/constraints.h"
+#include "solve/contact/planes.h"
+#include "solve/contact/term.h"
 #include "solve/deform.h"
-#include "solve/radial/contact_rows.h"
-#include "solve/radial/contact_terms.h"
 #include "solve/radial/radial_solver.h"
 #include "solve/radial/rest_shape.h"
 #include "solve/stylize.h"
@@ -61,7 +61,7 @@ Contact block_below() {
 }
 
 /// Positions of the planes' points.
-Points rows_at(const ContactTerms& contact) {
+Points rows_at(const ContactConstraints& contact) {
   const Points places = contact.snapshot().history.places;
   Points result(std::ssize(contact.found().rows), 3);
   for (Index i = 0; i < result.rows(); ++i)
@@ -157,7 +157,7 @@ BOOST_AUTO_TEST_CASE(forces_are_complementary_to_gaps) {
 BOOST_AUTO_TEST_CASE(a_snapshot_brings_its_own_points_back) {
   const RadialProblem problem(bar_samples(), few_centers(), {}, nullptr, nullptr);
   const RowMatrix<double> rest = problem.basis.identity();
-  ContactTerms contact(problem);
+  ContactConstraints contact(problem);
   contact.set(block_below(), rest);
   const ContactSnapshot coarse = [&] {
     contact.begin(rest);
@@ -168,8 +168,8 @@ BOOST_AUTO_TEST_CASE(a_snapshot_brings_its_own_points_back) {
   contact.update_pressures(rows_at(contact).data(), Vector::Ones(contact.surface_count()));
   const ContactSnapshot fine = contact.snapshot();
   const Index points = fine.history.places.rows();
-  BOOST_TEST(fine.history.refined.size() > 10u);
-  BOOST_TEST(coarse.history.refined.empty());
+  BOOST_TEST(fine.history.refined->samples.size() > 10u);
+  BOOST_TEST(coarse.history.refined->samples.empty());
   BOOST_TEST(points > coarse.history.places.rows());
   BOOST_TEST(fine.history.pressures.maxCoeff() > 0.0);
   RowMatrix<double> away = rest;
@@ -177,7 +177,7 @@ BOOST_AUTO_TEST_CASE(a_snapshot_brings_its_own_points_back) {
   for (int time = 0; time < 2; ++time) {  // from fewer points, and from as many
     contact.begin(away);
     contact.find(away);
-    BOOST_TEST(contact.snapshot().history.refined.empty());
+    BOOST_TEST(contact.snapshot().history.refined->samples.empty());
     BOOST_TEST(contact.restore(fine, rest) == depth);
     const ContactSnapshot back = contact.snapshot();
     BOOST_TEST((back.history.refined == fine.history.refined));
@@ -200,7 +200,7 @@ BOOST_AUTO_TEST_CASE(a_search_that_fails_leaves_whole_contact) {
   };
   Contact given = block_below();
   given.obstacles.push_back({std::make_shared<shapes::Analytic>(below)});
-  ContactTerms contact(problem);
+  ContactConstraints contact(problem);
   contact.set(given, rest);
   const double depth = contact.find(rest);
   const std::size_t planes = contact.found().planes.size();

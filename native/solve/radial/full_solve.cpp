@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/parallel.h"
+#include "solve/contact/parameters.h"
 #include "solve/radial/radial_solver.h"
 #include "solve/radial/rest_shape.h"
 #include "solve/setup.h"
@@ -15,68 +16,81 @@
 namespace arapfields {
 namespace {
 
-/// Quasi-Newton iterations between two checks of the time budget and of convergence.
-constexpr int steps_at_once = 10;
-/// A deformation has converged if `steps_at_once` iterations reduce the energy by less than this fraction.
-/// Thin parts under many held samples would take hundreds of iterations more for a gain of 1e-4.
-constexpr double least_gain = 1e-3;
-/// The same for a style, whose edges are still pulled straight for a while: half as many iterations more
-/// would gain 0.5 % at most.
-constexpr double least_style_gain = 5e-4;
-/// In contact it continues while they reduce the penetration depth, or the distance of handles that are held
-/// back, to less than these fractions.
-constexpr double depth_share = 0.8, distance_share = 0.98;
-/// Increases of the energy that do not end it (contact planes that become active raise the energy), and
-/// checks at which the depth is above the tolerance without having fallen.
-constexpr int most_rises = 6, most_stays = 3;
-/// Factor on least_gain while contact holds handles back, which would slide slowly for many iterations.
-constexpr double less_where_held = 10.0;
-/// A deformation with at least `worth_a_first` centers starts from a solve with half of them, `most_first` at
-/// most, of `first_steps` iterations.
-constexpr int worth_a_first = 600, most_first = 500, first_steps = 20;
-/// Where contact holds handles back, which slide slowly, it continues, at most `most_slides` times, while
-/// `solves_a_slide` solves of `steps_a_slide` iterations, which each pull a short way, reduce their distance
-/// or the energy to less than the fraction `least_slide`.
-constexpr int most_slides = 12, solves_a_slide = 5, steps_a_slide = 4;
-constexpr double least_slide = 0.99;
-/// Samples of a stylization's energy for each center, and the most.
-constexpr int style_samples_a_center = 8, most_style_samples = 8000;
-/// Centers, samples and iterations of the coarse solve that a stylization starts from.
-constexpr int style_first_centers = 400, style_first_samples = 4000, style_first_steps = 30;
-/// A styled field that folds between the energy samples is solved again, in rounds, with the folded samples
-/// added and the weight of the fold barrier multiplied by `unfolding`.
-constexpr int unfolding_rounds = 5, unfolding_steps = 15;
-constexpr double unfolding = 3.0;
-/// Factor on the weight of exact handles as soft handles of the radial field inside the blend, which no other
-/// term holds within their boxes.
-constexpr double share_of_exact = 0.01;
-/// Fewest surface samples, and energy samples, for each center: with fewer, the field overfits the samples
-/// and folds between them.
-constexpr int samples_a_center = 8, energy_samples_a_center = 10;
-/// Samples of a handle that enter the energy; with fewer, the result depends on which ones are drawn.
-constexpr int held_samples = 1024;
-/// Exact handles have narrow margins, which need more centers: a factor, and the most.
-constexpr double more_for_exact = 4.0 / 3.0;
-constexpr int most_for_exact = 2500;
-constexpr Index least_centers = 50;
+using P = ContactParameters;
+
+/// The constants of a whole solve, with their reasons.
+struct FullSolve {
+  /// Iterations between two checks of the time budget and of convergence: often enough for a budget.
+  static constexpr int check_iterations = 10;
+  /// A deformation has converged if a check's iterations reduce the energy by less than this fraction: thin
+  /// parts under many held samples would take hundreds of iterations more for a gain of 1e-4.
+  static constexpr double least_gain = 1e-3;
+  /// The same for a style, whose edges are still pulled straight for a while: half as many iterations more
+  /// would gain 0.5 % at most.
+  static constexpr double least_style_gain = 5e-4;
+  /// Relative tolerances of the solver: of a deformation, near single precision's; of a style, whose energy
+  /// is larger.
+  static constexpr double tolerance = 3e-5, style_tolerance = 1e-4;
+
+  /// Fewest surface samples, and energy samples, for each center: with fewer, the field overfits the samples
+  /// and folds between them.
+  static constexpr int samples_a_center = 8, energy_samples_a_center = 10;
+  /// Samples of a handle that enter the energy; with fewer, the result depends on which ones are drawn.
+  static constexpr int held_samples = 1024;
+  /// Fewest centers, of surfaces with few samples: fewer do not bend between two handles.
+  static constexpr Index least_centers = 50;
+  /// Coarse centers, wide ones, as a fraction of all: they carry the large motions.
+  static constexpr int centers_a_coarse = 5;
+  /// Exact handles have narrow margins, which need more centers: a factor, and the most.
+  static constexpr double more_for_exact = 4.0 / 3.0;
+  static constexpr int most_for_exact = 2500;
+  /// Factor on the weight of exact handles as soft handles of the radial field inside the blend, which no
+  /// other term holds within their boxes.
+  static constexpr double share_of_exact = 0.01;
+  /// Factor on the weight of handles that a blend with exact ones hardly bends, and their heaviest weight:
+  /// double precision ends above.
+  static constexpr double closer = 100.0, heaviest = 1e9;
+
+  /// A solve with at least so many centers starts from a coarse one, which costs a tenth.
+  static constexpr int min_centers_for_coarse_start = 600;
+  /// A deformation's coarse start: half of the centers, so many at most, and its iterations.
+  static constexpr int most_first = 500, first_iterations = 20;
+  /// A style's coarse start: centers, samples and iterations.
+  static constexpr int style_first_centers = 400, style_first_samples = 4000, style_first_iterations = 30;
+  /// Iterations of a network's start, which trains on.
+  static constexpr int start_iterations = 30;
+
+  /// Samples of a style's energy for each center, and the most: it is smoother than a deformation's.
+  static constexpr int style_samples_a_center = 8, most_style_samples = 8000;
+  /// A style's centers for each two coarse ones: styles move a surface little.
+  static constexpr int style_centers_a_coarse_pair = 13;
+  /// Radius of a style's fine Gaussians in their spacings: wide enough to be smooth between centers.
+  static constexpr double style_radius = 3.0;
+  /// Least weight of handles in a style: one of none would leave the shape free.
+  static constexpr double least_handle_weight = 1e-3;
+  /// A styled field that folds between the energy samples is solved again, in rounds of so many iterations,
+  /// with the folded samples added and the weight of the fold barrier multiplied by a factor.
+  static constexpr int unfolding_rounds = 5, unfolding_iterations = 15;
+  static constexpr double unfolding = 3.0;
+};
 
 template <class Options>
 LiveOptions live_options(const Options& options) {
   LiveOptions live;
   live.surface = options.surface;
-  live.handle_samples = std::max(options.handles.handle_batch, held_samples);
+  live.handle_samples = std::max(options.handles.handle_batch, FullSolve::held_samples);
   live.threads = options.machine.threads;
   live.seed = options.training.seed;
-  live.tolerance = 3e-5;
+  live.tolerance = FullSolve::tolerance;
   return live;
 }
 
 /// Sets the number of fine centers, limited by that of the samples, and a fifth as many coarse ones.
 void set_centers(LiveOptions& live, int centers, const SurfaceSamples& samples) {
-  const Index carried = std::max(least_centers, samples.size() / samples_a_center);
+  const Index carried = std::max(FullSolve::least_centers, samples.size() / FullSolve::samples_a_center);
   live.fine_centers = static_cast<int>(std::min<Index>(centers, carried));
-  live.coarse_centers = live.fine_centers / 5;
-  live.samples = std::max(live.samples, energy_samples_a_center * live.fine_centers);
+  live.coarse_centers = live.fine_centers / FullSolve::centers_a_coarse;
+  live.samples = std::max(live.samples, FullSolve::energy_samples_a_center * live.fine_centers);
 }
 
 /// Makes the field of the current state.
@@ -85,7 +99,7 @@ using Shown = std::function<std::shared_ptr<DeformationField>()>;
 /// Bounds on the solver's energy.
 struct Bounds {
   double worst = std::numeric_limits<double>::infinity();  ///< states of higher energy are not previewed
-  double least_gain = 0.0;  ///< least relative decrease in `steps_at_once` iterations
+  double least_gain = 0.0;  ///< least relative decrease in the iterations of a check
 };
 
 /// Sum of the distances of handles that are held back.
@@ -99,17 +113,17 @@ double distance_held(const ContactReport& contact) {
 void slide(RadialSolver& coarse, int iterations, const Progress& progress) {
   double held = distance_held(coarse.report().contact);
   double value = std::numeric_limits<double>::infinity();
-  for (int times = 0; held > 0.0 && times < most_slides; ++times) {
-    const double done = static_cast<double>(times) / most_slides;
-    for (int solve = 0; solve < solves_a_slide; ++solve)
-      coarse.solve(std::min(steps_a_slide, iterations), 0.0, progress.part(done, done));
+  for (int times = 0; held > 0.0 && times < P::most_slides; ++times) {
+    const double done = static_cast<double>(times) / P::most_slides;
+    for (int solve = 0; solve < P::solves_a_slide; ++solve)
+      coarse.solve(std::min(P::iterations_a_slide, iterations), 0.0, progress.part(done, done));
     const double before = std::exchange(held, distance_held(coarse.report().contact));
     const double higher = std::exchange(value, coarse.report().value);
-    if (held >= least_slide * before && value >= least_slide * higher) break;
+    if (held >= P::slide_gain * before && value >= P::slide_gain * higher) break;
   }
 }
 
-/// Decides after each `steps_at_once` iterations whether more of them are worth it.
+/// Decides at each check whether more of them are worth it.
 class Convergence {
  public:
   Convergence(double least, bool contact) : least_gain_(least), contact_(contact) {}
@@ -117,15 +131,16 @@ class Convergence {
     const ContactReport& contact = report.contact;
     const double held = distance_held(contact);
     const double gain = value_ - report.value;
-    const double least = (contact.held.empty() ? 1.0 : less_where_held) * least_gain_ * report.value;
+    const double least = (contact.held.empty() ? 1.0 : P::gain_while_held) * least_gain_ * report.value;
     const bool gains = report.iterations >= iterations && gain >= least;
-    const bool slides = held < distance_share * held_;
-    const bool rises = contact_ && gain <= -least && rises_++ < most_rises;
-    const bool comes_out = contact.deepest < depth_share * deepest_;
+    const bool slides = held < P::distance_gain * held_;
+    const bool rises = contact_ && gain <= -least && rises_++ < P::most_rises;
+    const bool comes_out = contact.deepest < P::depth_gain * deepest_;
     value_ = report.value;
     deepest_ = contact.deepest;
     held_ = held;
-    return gains || slides || rises || (contact.unsettled && (comes_out || stays_++ < most_stays));
+    return gains || slides || rises ||
+           (contact.unsettled && (comes_out || stalled_checks_++ < P::most_stalled_checks));
   }
 
  private:
@@ -135,7 +150,7 @@ class Convergence {
   double deepest_ = value_;
   double held_ = 0.0;  // sum of the distances of handles that are held back
   int rises_ = 0;
-  int stays_ = 0;
+  int stalled_checks_ = 0;
 };
 
 /// Solves until convergence, until the iterations or the time budget run out, or until the observer ends it.
@@ -161,7 +176,7 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
     };
   live.set_hooks(steps);
   while (result.iterations < iterations) {
-    const int at_once = std::min(steps_at_once, iterations - result.iterations);
+    const int at_once = std::min(FullSolve::check_iterations, iterations - result.iterations);
     const double done = static_cast<double>(result.iterations) / iterations;
     live.solve(at_once, 0.0, progress.part(done, done + static_cast<double>(at_once) / iterations));
     const double value = live.report().value;
@@ -180,6 +195,16 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
     }
   }
   return result;
+}
+
+/// The terms that a report measures.
+ObjectiveTerms measured_terms(const SurfaceSamples& samples, const std::vector<Handle>& handles,
+                              const RestShape& shape, const SurfaceOptions& surface) {
+  ObjectiveTerms terms;
+  terms.stiffness = SurfaceStiffness(shape.thickness, surface);
+  terms.handles = bound_handles(handles, samples);
+  terms.weights = energy_weights(samples, terms.handles);
+  return terms;
 }
 
 Solution finish(const Shown& shown, const SurfaceSamples& samples, const ObjectiveTerms& terms,
@@ -205,9 +230,10 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   LiveOptions fine = live_options(options);
   fine.locality = options.locality;
   fine.symmetry = options.symmetry;
-  const int more = std::min(most_for_exact, static_cast<int>(more_for_exact * options.centers));
+  const int more =
+      std::min(FullSolve::most_for_exact, static_cast<int>(FullSolve::more_for_exact * options.centers));
   set_centers(fine, exact != nullptr ? std::max(options.centers, more) : options.centers, samples);
-  fine.handle_weight = options.handles.handle_weight * (exact != nullptr ? share_of_exact : 1.0);
+  fine.handle_weight = options.handles.handle_weight * (exact != nullptr ? FullSolve::share_of_exact : 1.0);
   const auto blend = exact != nullptr ? exact->blend : nullptr;
   const auto around = [&](std::shared_ptr<DeformationField> field) {
     return exact != nullptr ? exact->around(std::move(field)) : field;
@@ -216,16 +242,17 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
       samples, fine.interior, static_cast<std::uint64_t>(options.training.seed), progress, axis);
   std::shared_ptr<RadialField> first;
   ContactReport contact_first;
-  if (exact != nullptr || fine.fine_centers >= worth_a_first) {
+  if (exact != nullptr || fine.fine_centers >= FullSolve::min_centers_for_coarse_start) {
     LiveOptions few = live_options(options);
     few.symmetry = options.symmetry;
     few.locality = options.locality;
-    set_centers(few, std::min(most_first, fine.fine_centers / 2), samples);
+    set_centers(few, std::min(FullSolve::most_first, fine.fine_centers / 2), samples);
     few.handle_weight = (exact != nullptr ? followed_closely(options) : options).handles.handle_weight;
     few.tolerance = LiveOptions().tolerance;
     RadialSolver solver(samples, handles, few, progress.part(0.0, 0.1), shape);
     solver.set_contact(hooks.contact, true, progress);
-    solver.solve(std::min(first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.13));
+    solver.solve(std::min(FullSolve::first_iterations, options.training.iterations), 0.0,
+                 progress.part(0.1, 0.13));
     slide(solver, options.training.iterations, progress.part(0.13, 0.15));
     contact_first = solver.report().contact;
     first = solver.field();
@@ -236,29 +263,25 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   solver.set_contact(hooks.contact, true, progress);
   if (first) solver.adopt(*first, contact_first);
   const Shown shown = [&] { return around(solver.field()); };
-  LoopResult loop =
-      run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0, shown, {.least_gain = least_gain});
-  ObjectiveTerms terms;
-  terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
-  terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
-  terms.weights = energy_weights(samples, terms.handles);
+  LoopResult loop = run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0, shown,
+                        {.least_gain = FullSolve::least_gain});
+  const ObjectiveTerms terms = measured_terms(samples, handles, *shape, options.surface);
   return finish(shown, samples, terms, std::move(loop), solver.report(), progress);
 }
 
 DeformOptions followed_closely(DeformOptions options) {
-  constexpr double closer = 100.0, heaviest = 1e9;
   options.exact_handles = false;
-  options.handles.handle_weight = std::min(closer * options.handles.handle_weight, heaviest);
+  options.handles.handle_weight =
+      std::min(FullSolve::closer * options.handles.handle_weight, FullSolve::heaviest);
   return options;
 }
 
 std::shared_ptr<const DeformationField> radial_start(const SurfaceSamples& samples,
                                                      const std::vector<Handle>& handles,
                                                      DeformOptions options, const Progress& progress) {
-  constexpr int start_steps = 30;
   if (options.exact_handles) options = followed_closely(options);
   options.invertibility = 0.0;
-  options.training.iterations = start_steps;
+  options.training.iterations = FullSolve::start_iterations;
   return deform_radial(samples, handles, options, progress).field;
 }
 
@@ -268,12 +291,13 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   // The solver's rigidity has weight 1: all other weights are divided by options.rigidity.
   LiveOptions live = live_options(options);
   live.locality.locality = 0.0;
-  live.samples = std::min(most_style_samples, style_samples_a_center * options.centers);
-  live.coarse_centers = 2 * options.centers / 13;
+  live.samples = std::min(FullSolve::most_style_samples, FullSolve::style_samples_a_center * options.centers);
+  live.coarse_centers = 2 * options.centers / FullSolve::style_centers_a_coarse_pair;
   live.fine_centers = options.centers;
-  live.fine_radius_factor = 3.0;
-  live.tolerance = 1e-4;
-  live.handle_weight = std::max(options.handles.handle_weight, 1e-3) / options.rigidity;
+  live.fine_radius_factor = FullSolve::style_radius;
+  live.tolerance = FullSolve::style_tolerance;
+  live.handle_weight =
+      std::max(options.handles.handle_weight, FullSolve::least_handle_weight) / options.rigidity;
   live.surface.barrier = options.surface.barrier / options.rigidity;
   live.gauss_weight = options.gauss_weight / options.rigidity;
   live.keep_stance = options.keep_stance / options.rigidity;
@@ -281,16 +305,17 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   const auto shape = std::make_shared<const RestShape>(
       samples, live.interior, static_cast<std::uint64_t>(options.training.seed), progress);
   double worst = std::numeric_limits<double>::infinity();
-  if (options.centers >= worth_a_first) {
+  if (options.centers >= FullSolve::min_centers_for_coarse_start) {
     LiveOptions few = live;
-    few.samples = style_first_samples;
-    few.fine_centers = style_first_centers;
-    few.coarse_centers = few.fine_centers / 5;
+    few.samples = FullSolve::style_first_samples;
+    few.fine_centers = FullSolve::style_first_centers;
+    few.coarse_centers = few.fine_centers / FullSolve::centers_a_coarse;
     RadialSolver quick(samples, handles, few, progress.part(0.0, 0.1), shape);
     quick.set_contact(hooks.contact, true, progress);
     quick.set_style(style, options.strength, options.sharpness, weights, up);
     const std::shared_ptr<const RadialField> first =
-        quick.solve(std::min(style_first_steps, options.training.iterations), 0.0, progress.part(0.1, 0.15));
+        quick.solve(std::min(FullSolve::style_first_iterations, options.training.iterations), 0.0,
+                    progress.part(0.1, 0.15));
     progress.preview([&](PointsIn points) { return first->at(points); });
     worst = quick.report().value;
   }
@@ -299,19 +324,18 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   solver.set_style(style, options.strength, options.sharpness, weights, up);
   const Shown shown = [&] { return solver.field(); };
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity,
-                              shown, {.worst = worst, .least_gain = least_style_gain});
+                              shown, {.worst = worst, .least_gain = FullSolve::least_style_gain});
   solver.set_hooks({hooks.energies, 1.0 / options.rigidity, {}, hooks.terms});
   const bool ended = loop.stopped_by == StopReason::observer || loop.stopped_by == StopReason::time_budget;
-  for (int round = 0; round < unfolding_rounds && options.surface.barrier > 0.0 && !ended; ++round) {
-    if (solver.add_fold_samples(unfolding * live.surface.barrier) == 0) break;
-    solver.solve(std::min(unfolding_steps, options.training.iterations), 0.0, progress.part(0.95, 0.98));
+  for (int round = 0; round < FullSolve::unfolding_rounds && options.surface.barrier > 0.0 && !ended;
+       ++round) {
+    if (solver.add_fold_samples(FullSolve::unfolding * live.surface.barrier) == 0) break;
+    solver.solve(std::min(FullSolve::unfolding_iterations, options.training.iterations), 0.0,
+                 progress.part(0.95, 0.98));
   }
-  ObjectiveTerms terms;
+  ObjectiveTerms terms = measured_terms(samples, handles, *shape, options.surface);
   terms.rigidity = options.rigidity;
-  terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
   terms.style = StyleAtSamples::of(style, samples.normals, options.sharpness);
-  terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
-  terms.weights = energy_weights(samples, terms.handles);
   return finish(shown, samples, terms, loop, solver.report(), progress);
 }
 

@@ -24,7 +24,7 @@ constexpr Index most_places = 256;
 }  // namespace
 
 void HandleTerms::set(const std::vector<Handle>& handles) {
-  bound_ = BoundHandles(in_cube(handles, problem_.frame()), problem_.surface());
+  bound_ = bound_handles(handles, problem_.samples);
   require_within_reach(bound_, problem_.surface());
   handles_ = handles;
   reaches_ = reaches();

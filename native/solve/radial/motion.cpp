@@ -6,14 +6,40 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "solve/radial/contact_forces.h"
-#include "solve/radial/contact_handles.h"
+#include "solve/contact/forces.h"
+#include "solve/contact/handles.h"
 #include "solve/radial/handle_motion.h"
 #include "solve/radial/state.h"
-#include "solve/radial/time_scheme.h"
 
 namespace arapfields {
 namespace {
+
+/// One implicit step of length h from place q, velocity v and acceleration a to q', v', a':
+///   q' = q + h v + h² ((½ − β) a + β a'), v' = v + h ((1 − γ) a + γ a'),
+///   mass ((1 − α) a' + α a) = force at q + w (q' − q).
+struct TimeScheme {
+  double alpha;
+  double w;
+  double gamma;
+  double beta;
+  bool operator==(const TimeScheme&) const = default;
+
+  /// The generalised-α method (Chung & Hulbert, J. Appl. Mech. 60, 1993) of second order. `kept` is the
+  /// spectral radius at infinite frequency.
+  static constexpr TimeScheme generalised_alpha(double kept) {
+    const double alpha = (2.0 * kept - 1.0) / (kept + 1.0), w = 1.0 / (kept + 1.0);
+    return {alpha, w, 0.5 - alpha + 1.0 - w, 0.25 * (2.0 - alpha - w) * (2.0 - alpha - w)};
+  }
+  /// The midpoint rule, of second order. It needs no acceleration at its start: a = 0.
+  static constexpr TimeScheme midpoint() { return {0.0, 0.5, 1.0, 0.5}; }
+  /// Of first order, with a = 0. It dissipates energy even if its system is solved roughly.
+  static constexpr TimeScheme backward_euler() { return {0.0, 1.0, 1.0, 1.0}; }
+
+  /// Factor of a' per unit of mass in the equation of motion; `drag` is the damping rate times h.
+  constexpr double inert(double drag) const { return 1.0 - alpha + drag * w * gamma; }
+  /// Factor of h² a' in the displacement to q + w (q' − q), where the force is evaluated.
+  constexpr double reach() const { return w * beta; }
+};
 
 /// Spectral radius of the generalised-α method at infinite frequency: the factor on the amplitude a step. It
 /// damps the ringing after a jump of the handles, and resolved oscillations hardly at all.
@@ -28,12 +54,6 @@ constexpr double motion_share = 3e-4, largest_share = 1e-2, motion_tolerance = 3
 constexpr Index first_iterations = 4;
 /// Largest correction by remaining_step().
 constexpr double most_left = 0.1;
-
-/// Augmented-Lagrangian rounds of a step at most, beside its first solve, while points penetrate or the
-/// pressures' relative change is at least `unsettled`: pressures of the step before may hold the impulse of
-/// an impact, which would make a body bounce.
-constexpr Index contact_rounds = 8;
-constexpr double unsettled = 0.2;
 
 /// Bounds of a frame's length, in seconds.
 constexpr double shortest_frame = 1e-5, longest_frame = 10.0;
@@ -138,8 +158,9 @@ bool TimeIntegrator::integrate_step(const TimeScheme& scheme, const Progress& pr
                  {tries * state_.problem.options.iterations, motion_tolerance,
                   share * state_.report.kinetic + motion_floor},
                  progress);
-  for (Index round = 0; scheme == TimeScheme::backward_euler() && round < contact_rounds; ++round) {
-    const bool settled = update_pressures(state_) < unsettled;
+  for (Index round = 0; scheme == TimeScheme::backward_euler() && round < ContactParameters::motion_rounds;
+       ++round) {
+    const bool settled = update_pressures(state_) < ContactParameters::unsettled;
     if (settled && !is_deep(state_)) break;
     stiffen_contact(state_);
     state_.descend(

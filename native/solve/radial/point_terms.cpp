@@ -2,7 +2,6 @@
 #include "solve/radial/point_terms.h"
 
 #include "core/errors.h"
-#include "solve/radial/contact_sides.h"
 
 namespace arapfields {
 namespace {
@@ -104,45 +103,11 @@ void RidgeTerm<Scalar>::pull_back(const Scalar* cotangents, RowMatrix<double>& g
   Eigen::Map<Vector>(gradient.data(), 3 * rows()) += numbers_at(cotangents, rows()).template cast<double>();
 }
 
-template <class Scalar>
-ContactTerm<Scalar>::ContactTerm(const RadialBasis& basis, const ContactSet& contact) : planes_(&contact) {
-  if (!contact.planes.empty())
-    places_ = RadialEvaluator<Scalar>(basis, contact.places, JetOrder::value,
-                                      contact.embedded.rows() > 0 ? &contact.embedded : nullptr);
-}
-
-template <class Scalar>
-double ContactTerm<Scalar>::first_trial(const Scalar* u, const Scalar* du, double slope) const {
-  return contact_step<Scalar>(planes_->planes, planes_->stiffness, u, du, slope);
-}
-
-template <class Scalar>
-void ContactTerm<Scalar>::measure(const RowMatrix<double>& c, const PointsOf<Scalar>&, Scalar* u) const {
-  places_.evaluate(c, {u, rows(), JetOrder::value});
-}
-
-template <class Scalar>
-RowMatrix<double> ContactTerm<Scalar>::measure_field(const JetsAt& jets_at) const {
-  return jets_at(rows() > 0 ? planes_->places : Points(0, 3), JetOrder::value);
-}
-
-template <class Scalar>
-double ContactTerm<Scalar>::value(const Scalar* u, Scalar* cotangents) const {
-  return contact_energy<Scalar>(planes_->planes, planes_->stiffness, u, cotangents);
-}
-
-template <class Scalar>
-void ContactTerm<Scalar>::pull_back(const Scalar* cotangents, RowMatrix<double>& gradient) const {
-  places_.pull_back({cotangents, rows(), JetOrder::value}, gradient);
-}
-
 template class HandleTerm<float>;
 template class HandleTerm<double>;
 template class LinkTerm<float>;
 template class LinkTerm<double>;
 template class RidgeTerm<float>;
 template class RidgeTerm<double>;
-template class ContactTerm<float>;
-template class ContactTerm<double>;
 
 }  // namespace arapfields

@@ -6,14 +6,11 @@
 #include <string>
 
 #include "core/tall_product.h"
-#include "energies/contact.h"
 #include "energies/handles.h"
 #include "fields/radial_evaluator.h"
 #include "solve/radial/part_links.h"
 
 namespace arapfields {
-
-struct ContactSet;
 
 /// Jets (columns·n, 3) of some field at points (n,3) of the solver's cube.
 using JetsAt = std::function<RowMatrix<double>(const Points& points, JetOrder order)>;
@@ -102,27 +99,6 @@ class RidgeTerm final : public PointTerm<Scalar> {
 
  private:
   Index centers_ = 0;
-};
-
-/// Contact planes at the points of a ContactSet (contact_sides.h), which is borrowed.
-template <class Scalar>
-class ContactTerm final : public PointTerm<Scalar> {
- public:
-  ContactTerm() = default;
-  ContactTerm(const RadialBasis& basis, const ContactSet& contact);
-  /// First trial step length of a line search (energies/contact.h).
-  double first_trial(const Scalar* u, const Scalar* du, double slope) const;
-
-  Index rows() const override { return places_.size(); }
-  void measure(const RowMatrix<double>& c, const PointsOf<Scalar>& rounded, Scalar* u) const override;
-  RowMatrix<double> measure_field(const JetsAt& jets_at) const override;
-  double value(const Scalar* u, Scalar* cotangents) const override;
-  void pull_back(const Scalar* cotangents, RowMatrix<double>& gradient) const override;
-  void model(const Scalar*, Scalar*) const override {}
-
- private:
-  const ContactSet* planes_ = nullptr;
-  RadialEvaluator<Scalar> places_;
 };
 
 }  // namespace arapfields

@@ -8,7 +8,7 @@
 #include "energies/shared_motion.h"
 #include "energies/stance.h"
 #include "sampling/sample_weights.h"
-#include "solve/radial/contact_solve.h"
+#include "solve/contact/continuation.h"
 #include "solve/radial/handle_motion.h"
 #include "solve/radial/state.h"
 #include "solve/setup.h"
@@ -180,7 +180,7 @@ Index RadialSolver::follow(Index iterations, double tolerance, const Progress& p
   const bool is_exact = tolerance < single_tolerance;
   const auto freely = [&](Index steps) { follow_freely(s, steps, tolerance, progress); };
   if (s.contact.any())
-    ContactSolve(s, iterations, std::max(tolerance, single_tolerance), freely, progress).follow();
+    solve_in_contact(s, iterations, std::max(tolerance, single_tolerance), freely, progress);
   else
     freely(iterations);
   if (!s.handles.any() && !s.hooks.adds_terms() && !s.contact.has_planes()) anchor(s);

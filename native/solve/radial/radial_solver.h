@@ -9,7 +9,7 @@
 #include "fields/radial_field.h"
 #include "mesh/surface_samples.h"
 #include "options/live.h"
-#include "solve/contact.h"
+#include "solve/contact/contact.h"
 #include "solve/radial/hooks.h"
 #include "solve/radial/report.h"
 #include "solve/radial/secondary_motion.h"
@@ -97,8 +97,5 @@ class ARAPFIELDS_EXPORT RadialSolver {
  private:
   std::unique_ptr<RadialState> state_;
 };
-
-/// The former name, kept for one release.
-using LiveSolver = RadialSolver;
 
 }  // namespace arapfields

@@ -9,7 +9,7 @@
 #include "energies/arap.h"
 #include "energies/distortion.h"
 #include "optimize/iteration.h"
-#include "solve/contact.h"
+#include "solve/contact/contact.h"
 
 namespace arapfields {
 

@@ -5,6 +5,7 @@
 #include "fields/mirror.h"
 #include "sampling/canonical_order.h"
 #include "sampling/sample_choice.h"
+#include "solve/contact/points.h"
 #include "solve/setup.h"
 
 namespace arapfields {

@@ -11,9 +11,10 @@
 #include "options/choices.h"
 #include "sampling/local_thickness.h"
 #include "sampling/parts.h"
-#include "solve/radial/followed_places.h"
 
 namespace arapfields {
+
+struct FollowedPlaces;
 
 /// Precomputed data of a rest surface that do not depend on handles, shared by all solvers on the same
 /// samples. In cube coordinates.

@@ -17,8 +17,6 @@ namespace {
 constexpr int most_uses = 16;
 /// Relative error of the objective in single precision.
 constexpr double single_error = 1e-6;
-/// Least fold barrier while handles pull into contact.
-constexpr double contact_barrier = 10.0;
 
 }  // namespace
 
@@ -101,7 +99,8 @@ JetTermList RadialState::jet_terms(std::optional<Body<double>> body) {
     settings.stance = weighted->stance;
     settings.keep_stance = weighted->weight;
   }
-  settings.barrier = std::max(problem.options.surface.barrier, contact.has_planes() ? contact_barrier : 0.0);
+  settings.barrier =
+      std::max(problem.options.surface.barrier, contact.has_planes() ? ContactParameters::fold_barrier : 0.0);
   settings.barrier_threshold = problem.options.surface.barrier_threshold;
   settings.locality = locality();
   settings.body = std::move(body);

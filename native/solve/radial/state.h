@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "fields/tracked_points.h"
-#include "solve/radial/contact_terms.h"
+#include "solve/contact/constraints.h"
 #include "solve/radial/dynamics.h"
 #include "solve/radial/handle_terms.h"
 #include "solve/radial/objective.h"
@@ -94,7 +94,7 @@ struct RadialState {
   StyleTerms style;
   StiffnessTerms stiffness;
   SurfaceDynamics dynamics;
-  ContactTerms contact;
+  ContactConstraints contact;
   Dependent<std::vector<Index>, 1> holders;   ///< the handle that holds each sample; −1: none
   Dependent<Vector, 2> locality_shares;       ///< of the energy samples (solve/held_parts.h)
   Dependent<Vector, 1> pin_widths;            ///< width of the shape at each point handle

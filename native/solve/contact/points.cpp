@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/radial/contact_points.h"
+#include "solve/contact/points.h"
 
 #include <algorithm>
 #include <bit>
@@ -8,25 +8,49 @@
 
 #include "core/decompositions.h"
 #include "core/jacobians.h"
+#include "core/random.h"
 #include "core/unit_rows.h"
+#include "sampling/oriented_points.h"
 #include "sampling/sample_choice.h"
+#include "sampling/standing_out.h"
+#include "solve/contact/parameters.h"
 
 namespace arapfields {
 namespace {
 
-/// Most refined points.
-constexpr Index most_finer = 12000;
-/// Refined points for the area of one sample, and their greatest distance from it, in sample spacings.
-constexpr double finer_density = 12.0, finer_reach = 2.2;
-/// Least cosine between the normals of neighbours on the same side of the surface.
-constexpr double same_side = 0.5;
-/// How far beyond a sharp edge of the shape, in sample spacings, a refined point may lie.
-constexpr double over_edge = 0.05;
-/// Fewest neighbours for the fit of a quadratic height field; with fewer, refined points lie in the tangent
-/// plane.
-constexpr Index least_fitted = 5;
+using P = ContactParameters;
+
+/// Rows of two arrays, the second after the first.
+Points rows_of_both(const Points& first, const Points& second, const std::vector<Index>& rows) {
+  Points result(std::ssize(rows), 3);
+  for (Index i = 0; i < result.rows(); ++i) {
+    const Index row = rows[static_cast<std::size_t>(i)];
+    result.row(i) = row < first.rows() ? first.row(row) : second.row(row - first.rows());
+  }
+  return result;
+}
 
 }  // namespace
+
+FollowedPlaces::FollowedPlaces(const SurfaceSamples& surface, const std::vector<std::uint32_t>& order,
+                               std::uint64_t seed, const Progress& progress) {
+  Random random(seed, P::sample_stream);
+  samples = stratified(order, std::min(P::most_samples, surface.size()), random);
+  rest = rows_of(surface.points, samples);
+  const PointGrid coarse(rest, P::area_cell);  // a cell holds about area_cell² of the surface
+  spacing = P::area_cell * std::sqrt(static_cast<double>(coarse.size()) / static_cast<double>(rest.rows()));
+  if (!surface.mesh) return;
+  Points normals = Points::Zero(rest.rows(), 3);
+  if (surface.normals.rows() == surface.size()) normals = unit_rows(rows_of(surface.normals, samples));
+  const Points vertices =
+      surface.frame.to_cube(used_vertices(surface.mesh->vertices, surface.mesh->triangles));
+  const Points found = rows_of(
+      vertices, standing_out(vertices, rest, normals, spacing, P::stands_out, P::most_vertices, progress));
+  const Points alike = Points::Zero(std::max(rest.rows(), found.rows()), 3);
+  parents = OrientedPoints(rest, alike.topRows(rest.rows())).nearest(found, alike.topRows(found.rows()), 0.0);
+  rest.conservativeResize(rest.rows() + found.rows(), Eigen::NoChange);
+  rest.bottomRows(found.rows()) = found;
+}
 
 void ContactPoints::choose(const Progress& progress) {
   if (!samples_.empty()) return;
@@ -36,24 +60,26 @@ void ContactPoints::choose(const Progress& progress) {
   rest_ = followed->rest;
   spacing_ = followed->spacing;
   near_.resize(samples_.size());
-  is_fine_.assign(samples_.size(), false);
   embedded_ = embedded_at(rest_);
-  coarse_ = rest_.rows();
 }
 
-Index ContactPoints::sample_of(Index row) const {
-  return row < sample_count() ? row : parents_[static_cast<std::size_t>(row - sample_count())];
+Index ContactPoints::sample_of(Index row, const RefinedPoints& refined) const {
+  if (row < sample_count()) return row;
+  return row < coarse_count() ? parents_[static_cast<std::size_t>(row - sample_count())]
+                              : refined.parents[static_cast<std::size_t>(row - coarse_count())];
 }
 
 double ContactPoints::area(Index row) const {
   const double whole = 1.0 / static_cast<double>(sample_count());
-  return row < coarse_ ? whole : 0.5 * whole;
+  return row < coarse_count() ? whole : 0.5 * whole;
 }
 
-Points ContactPoints::rest(const std::vector<Index>& rows) const { return rows_of(rest_, rows); }
+Points ContactPoints::rest(const std::vector<Index>& rows, const RefinedPoints& refined) const {
+  return rows_of_both(rest_, refined.rest, rows);
+}
 
-Points ContactPoints::embedded(const std::vector<Index>& rows) const {
-  return embedded_.rows() > 0 ? rows_of(embedded_, rows) : Points(0, 3);
+Points ContactPoints::embedded(const std::vector<Index>& rows, const RefinedPoints& refined) const {
+  return embedded_.rows() > 0 ? rows_of_both(embedded_, refined.embedded, rows) : Points(0, 3);
 }
 
 Points ContactPoints::normals(const std::vector<Index>& samples) const {
@@ -73,7 +99,7 @@ Points ContactPoints::embedded_at(PointsIn places) const {
 const std::vector<Index>& ContactPoints::neighbours(Index sample) {
   const Index n = sample_count();
   if (!grid_) {
-    grid_ = std::make_unique<PointGrid>(rest_.topRows(n), 2.0 * finer_reach * spacing_);
+    grid_ = std::make_unique<PointGrid>(rest_.topRows(n), 2.0 * P::refined_reach * spacing_);
     cells_ = grid_->cell_of_each();
   }
   std::vector<Index>& found = near_[static_cast<std::size_t>(sample)];
@@ -81,12 +107,12 @@ const std::vector<Index>& ContactPoints::neighbours(Index sample) {
   const Points& normals = problem_.samples.normals;
   const bool faces = normals.rows() == problem_.samples.size();
   const auto normal = [&](Index i) { return normals.row(samples_[static_cast<std::size_t>(i)]); };
-  const double square = 4.0 * finer_reach * finer_reach * spacing_ * spacing_;
+  const double square = 4.0 * P::refined_reach * P::refined_reach * spacing_ * spacing_;
   found.push_back(sample);
   grid_->near(cells_[static_cast<std::size_t>(sample)], [&](Index cell) {
     for (const Index i : grid_->rows(cell))
       if (i != sample && (rest_.row(i) - rest_.row(sample)).squaredNorm() < square &&
-          (!faces || normal(i).dot(normal(sample)) > same_side))
+          (!faces || normal(i).dot(normal(sample)) > P::neighbour_cosine))
         found.push_back(i);
   });
   return found;
@@ -120,26 +146,27 @@ Points ContactPoints::made_finer(Index sample) {
     right += arm.dot(normal) * terms;
   }
   Vec3 bend = Vec3::Zero();
-  if (std::ssize(around) > least_fitted) {
-    gram.diagonal().array() += 1e-3 * gram.trace();
+  if (std::ssize(around) > P::least_fitted) {
+    gram.diagonal().array() += P::fit_ridge * gram.trace();
     bend = solve_definite(gram, right);
   }
   std::vector<Index> sides;  // nearby samples beyond a sharp edge
   grid_->near(cells_[static_cast<std::size_t>(sample)], [&](Index cell) {
     for (const Index i : grid_->rows(cell))
-      if ((rest_.row(i) - rest_.row(sample)).norm() < 2.0 * finer_reach * spacing_ &&
-          normal.dot(normal_at(i)) <= same_side)
+      if ((rest_.row(i) - rest_.row(sample)).norm() < 2.0 * P::refined_reach * spacing_ &&
+          normal.dot(normal_at(i)) <= P::neighbour_cosine)
         sides.push_back(i);
   });
   const auto off_the_surface = [&](const Vec3& place) {  // beyond a sharp edge
     return std::any_of(sides.begin(), sides.end(), [&](Index i) {
       const Vec3 arm = place - rest_.row(i).transpose();
-      return arm.norm() < finer_reach * spacing_ && arm.dot(normal_at(i)) > over_edge * spacing_;
+      return arm.norm() < P::refined_reach * spacing_ && arm.dot(normal_at(i)) > P::beyond_edge * spacing_;
     });
   };
   std::vector<Vec3> places;
-  const double density = finer_density / (spacing_ * spacing_);
-  const auto count = static_cast<int>(std::numbers::pi * finer_reach * finer_reach * finer_density);
+  const double density = P::refined_density / (spacing_ * spacing_);
+  const auto count =
+      static_cast<int>(std::numbers::pi * P::refined_reach * P::refined_reach * P::refined_density);
   const double golden = std::numbers::pi * (3.0 - std::sqrt(5.0));
   for (int k = 1; k < count; ++k) {
     const double radius = std::sqrt(static_cast<double>(k) / (std::numbers::pi * density));
@@ -156,78 +183,55 @@ Points ContactPoints::made_finer(Index sample) {
   return result;
 }
 
-void ContactPoints::refine(const std::vector<Index>& samples) {
-  if (problem_.samples.normals.rows() != problem_.samples.size()) return;
-  const Index known = rest_.rows();
+ContactPoints::Refined ContactPoints::refine(const Refined& refined, const std::vector<Index>& samples) {
+  if (problem_.samples.normals.rows() != problem_.samples.size()) return refined;
+  RefinedPoints result = *refined;
   for (const Index sample : samples) {
-    if (is_fine_[static_cast<std::size_t>(sample)] || size() - coarse_ > most_finer) continue;
+    if (result.rest.rows() > P::most_refined) break;
+    if (std::find(result.samples.begin(), result.samples.end(), sample) != result.samples.end()) continue;
     const Points& more = finer(sample);
-    is_fine_[static_cast<std::size_t>(sample)] = true;
-    const Index before = rest_.rows();
-    rest_.conservativeResize(before + more.rows(), Eigen::NoChange);
-    rest_.bottomRows(more.rows()) = more;
-    parents_.insert(parents_.end(), static_cast<std::size_t>(more.rows()), sample);
-    refined_.push_back(sample);
-    ends_.push_back(rest_.rows());
+    result.samples.push_back(sample);
+    result.rest.conservativeResize(result.rest.rows() + more.rows(), Eigen::NoChange);
+    result.rest.bottomRows(more.rows()) = more;
+    result.parents.insert(result.parents.end(), static_cast<std::size_t>(more.rows()), sample);
   }
-  if (rest_.rows() == known) return;
-  ++finer_places_;
-  const Points more = embedded_at(rest_.bottomRows(rest_.rows() - known));
-  if (more.rows() == 0) return;
-  embedded_.conservativeResize(rest_.rows(), Eigen::NoChange);
-  embedded_.bottomRows(more.rows()) = more;
-}
-
-void ContactPoints::set_refined(const std::vector<Index>& samples) {
-  const auto [end, other] = std::mismatch(refined_.begin(), refined_.end(), samples.begin(), samples.end());
-  const std::ptrdiff_t kept = end - refined_.begin();
-  if (end != refined_.end()) {
-    const Index rows = kept > 0 ? ends_[static_cast<std::size_t>(kept) - 1] : coarse_;
-    for (auto sample = end; sample != refined_.end(); ++sample)
-      is_fine_[static_cast<std::size_t>(*sample)] = false;
-    refined_.resize(static_cast<std::size_t>(kept));
-    ends_.resize(static_cast<std::size_t>(kept));
-    parents_.resize(static_cast<std::size_t>(rows - sample_count()));
-    rest_.conservativeResize(rows, Eigen::NoChange);
-    if (embedded_.rows() > 0) embedded_.conservativeResize(rows, Eigen::NoChange);
-    places_.conservativeResize(std::min<Index>(places_.rows(), rows), Eigen::NoChange);
-    ++finer_places_;
+  if (result.samples.size() == refined->samples.size()) return refined;
+  const Index known = refined->rest.rows(), count = result.rest.rows();
+  if (const Points more = embedded_at(result.rest.bottomRows(count - known)); more.rows() > 0) {
+    result.embedded.conservativeResize(count, Eigen::NoChange);
+    result.embedded.bottomRows(more.rows()) = more;
   }
-  refine({samples.begin() + kept, samples.end()});
+  result.revision = ++refinements_;
+  return std::make_shared<const RefinedPoints>(std::move(result));
 }
 
 /// FNV-1a.
 std::uint64_t ContactPoints::identity() const {
   std::uint64_t hash = 0xcbf29ce484222325u;
   const double* numbers = rest_.data();
-  for (Index i = 0; i < 3 * coarse_; ++i)
+  for (Index i = 0; i < rest_.size(); ++i)
     hash = (hash ^ std::bit_cast<std::uint64_t>(numbers[i])) * 0x100000001b3u;
   return hash;
 }
 
-const Points& ContactPoints::at(const RowMatrix<double>& coefficients) {
-  const Index n = coarse_, all = size();
-  if (!is_at(coefficients)) places_.resize(0, 3);
-  coefficients_ = coefficients;
-  const Index known = places_.rows();
-  if (known == all) return places_;
-  Points places(all, 3);
-  places.topRows(known) = places_;
-  const auto fill = [&](Dependent<RadialEvaluator<float>, 1>& made, Revision of, Index first, Index count) {
+Points ContactPoints::at(const RowMatrix<double>& coefficients, const RefinedPoints& refined) {
+  const auto moved = [&](Dependent<RadialEvaluator<float>, 1>& made, Revision of, const Points& rest,
+                         const Points& embedded) -> Points {
     const RadialEvaluator<float>& evaluator = made.get({of}, [&] {
-      Points embedded;
-      if (embedded_.rows() > 0) embedded = embedded_.middleRows(first, count);
-      return RadialEvaluator<float>(problem_.basis, rest_.middleRows(first, count), JetOrder::value,
+      return RadialEvaluator<float>(problem_.basis, rest, JetOrder::value,
                                     embedded.rows() > 0 ? &embedded : nullptr);
     });
-    PointsF values(count, 3);
-    evaluator.evaluate(coefficients, {values.data(), count, JetOrder::value});
-    places.middleRows(first, count) = values.cast<double>();
+    PointsF values(rest.rows(), 3);
+    evaluator.evaluate(coefficients, {values.data(), values.rows(), JetOrder::value});
+    return values.cast<double>();
   };
-  if (known < n) fill(evaluator_, 1, 0, n);
-  if (all > n) fill(finer_, finer_places_, n, all - n);
-  places_ = std::move(places);
-  return places_;
+  if (places_.rows() == 0 || !is_at(coefficients)) places_ = moved(evaluator_, 1, rest_, embedded_);
+  coefficients_ = coefficients;
+  Points places(size(refined), 3);
+  places.topRows(coarse_count()) = places_;
+  if (refined.rest.rows() > 0)
+    places.bottomRows(refined.rest.rows()) = moved(finer_, refined.revision, refined.rest, refined.embedded);
+  return places;
 }
 
 Points ContactPoints::normals_at(const RowMatrix<double>& coefficients, const std::vector<Index>* blocks) {

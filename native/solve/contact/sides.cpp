@@ -1,39 +1,32 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Initial intersections of an obstacle with the surface. There the nearest points on the obstacle lie on
-// opposite sides for neighbouring samples, and no side is known to be the right one.
+#include "solve/contact/sides.h"
+
 #include <algorithm>
 #include <utility>
 
 #include "core/point_grid.h"
 #include "sampling/sample_choice.h"
-#include "solve/radial/contact_sides.h"
+#include "solve/radial/handle_motion.h"
 
 namespace arapfields {
 namespace {
 
-/// Largest cosine of normals that count as opposite.
-constexpr double opposite = -0.5;
-/// Largest distance of neighbours at rest, in sample spacings.
-constexpr double nearby = 3.0;
-/// A patch can be pushed out as a whole if its mean normal is at least `one_sided` long, and the cosines of
-/// the obstacle's normals with it are somewhere above `along` and nowhere below `against`, or so with both
-/// signs reversed.
-constexpr double one_sided = 0.5, along = 0.7, against = -0.2;
+using P = ContactParameters;
 
 /// Whether the obstacle's normals (n,3) push a patch with these rest normals to one side of it as a whole.
 bool comes_out(PointsIn ways_out, PointsIn normals) {
   const Vec3 mean = normals.colwise().mean();
-  if (mean.norm() < one_sided) return false;
+  if (mean.norm() < P::one_sided) return false;
   const Vector cosines = ways_out * mean.normalized();
-  return (cosines.minCoeff() > against && cosines.maxCoeff() > along) ||
-         (cosines.maxCoeff() < -against && cosines.minCoeff() < -along);
+  return (cosines.minCoeff() > P::pushes_against && cosines.maxCoeff() > P::pushes_along) ||
+         (cosines.maxCoeff() < -P::pushes_against && cosines.minCoeff() < -P::pushes_along);
 }
 
 /// Samples near an obstacle, and the search for those that it crosses. Rows index these samples alone.
 class SamplesBeside {
  public:
   /// `places` (n,3) are the positions of all samples, `distances` (n) their signed distances to the obstacle.
-  SamplesBeside(const BarrierSurface& obstacle, const ContactPoints& points, PointsIn places,
+  SamplesBeside(const ContactSurface& obstacle, const ContactPoints& points, PointsIn places,
                 const Vector& distances);
   /// Samples to be left where they are: connected patches inside the obstacle that it crosses, their outside
   /// neighbours, and outside neighbours of each other with the obstacle in between.
@@ -43,7 +36,7 @@ class SamplesBeside {
   static std::vector<Index> nearer(const Vector& distances, double reach);
   bool is_inside(Index row) const { return distances_[row] < 0.0; }
   bool are_opposite(Index row, Index other) const {
-    return normals_.row(row).dot(normals_.row(other)) <= opposite;
+    return normals_.row(row).dot(normals_.row(other)) <= P::opposite_cosine;
   }
   template <class Take>
   void each_neighbour(Index row, Take&& take) const;
@@ -51,7 +44,7 @@ class SamplesBeside {
   void mark_patch(Index row);
   void mark_between(const std::vector<Index>& from, const std::vector<Index>& to);
 
-  const BarrierSurface& obstacle_;
+  const ContactSurface& obstacle_;
   const ContactPoints& points_;
   double reach_;
   std::vector<Index> samples_;
@@ -72,11 +65,11 @@ std::vector<Index> SamplesBeside::nearer(const Vector& distances, double reach) 
   return samples;
 }
 
-SamplesBeside::SamplesBeside(const BarrierSurface& obstacle, const ContactPoints& points, PointsIn places,
+SamplesBeside::SamplesBeside(const ContactSurface& obstacle, const ContactPoints& points, PointsIn places,
                              const Vector& distances)
     : obstacle_(obstacle),
       points_(points),
-      reach_(nearby * points.spacing()),
+      reach_(P::crossing_reach * points.spacing()),
       samples_(nearer(distances, reach_)),
       places_(rows_of(places, samples_)),
       rest_(points.rest(samples_)),
@@ -117,7 +110,7 @@ void SamplesBeside::mark_patch(Index row) {
 
 /// Marks pairs of rows (from_k, to_k) with the obstacle in between.
 void SamplesBeside::mark_between(const std::vector<Index>& from, const std::vector<Index>& to) {
-  const std::vector<BarrierSurface::Hit> hits =
+  const std::vector<ContactSurface::Hit> hits =
       obstacle_.first_hits(rows_of(places_, from), rows_of(places_, to));
   for (std::size_t k = 0; k < hits.size(); ++k) {
     if (hits[k].parameter > 1.0) continue;
@@ -146,8 +139,38 @@ std::vector<Index> SamplesBeside::crossed() {
 
 }  // namespace
 
-void ContactSides::find_crossings(Index surface, const BarrierSurface& obstacle, const ContactPoints& points,
-                                  PointsIn places) {
+ContactSides::ContactSides(Index points, std::size_t surfaces)
+    : outside(surfaces),
+      anchors(surfaces),
+      clearance(points, static_cast<Index>(surfaces)),
+      crossed(surfaces) {}
+
+void ContactSides::start(Index surface, const ContactSurface& obstacle, PointsIn places) {
+  const auto k = static_cast<std::size_t>(surface);
+  outside[k] = anchors[k] = places;
+  clearance.col(surface) = obstacle.distances(places);
+  crossed[k].clear();
+}
+
+void ContactSides::move_with(Index surface, const Mat4& motion) {
+  const auto k = static_cast<std::size_t>(surface);
+  outside[k] = affine_image(outside[k], motion);
+  anchors[k] = affine_image(anchors[k], motion);
+}
+
+void ContactSides::add(const std::vector<Index>& like) {
+  const Index before = clearance.rows(), count = before + std::ssize(like);
+  clearance.conservativeResize(count, Eigen::NoChange);
+  clearance.bottomRows(std::ssize(like)) = clearance(like, Eigen::all).eval();
+  for (std::vector<Points>* each : {&outside, &anchors})
+    for (Points& places : *each) {
+      places.conservativeResize(count, Eigen::NoChange);
+      places.bottomRows(std::ssize(like)) = places(like, Eigen::all).eval();
+    }
+}
+
+void ContactSides::find_crossings(Index surface, const ContactSurface& obstacle, const ContactPoints& points,
+                                  const RefinedPoints& refined, PointsIn places) {
   std::vector<bool>& samples = crossed[static_cast<std::size_t>(surface)];
   samples.clear();
   if (obstacle.is_ground() || obstacle.is_sheet()) return;
@@ -161,7 +184,7 @@ void ContactSides::find_crossings(Index surface, const BarrierSurface& obstacle,
     if (clearance(row, surface) < 0.0) clearance(row, surface) = left_inside;
   }
   for (Index row = count; row < clearance.rows(); ++row)
-    if (clearance(row, surface) < 0.0 && crosses(surface, points.sample_of(row)))
+    if (clearance(row, surface) < 0.0 && crosses(surface, points.sample_of(row, refined)))
       clearance(row, surface) = left_inside;
 }
 
@@ -173,7 +196,7 @@ std::vector<Index> ContactSides::crossing_surfaces() const {
   return surfaces;
 }
 
-void ContactSides::begin_beside_crossings(Index surface, const BarrierSurface& obstacle,
+void ContactSides::begin_beside_crossings(Index surface, const ContactSurface& obstacle,
                                           const std::vector<Index>& samples, PointsIn places) {
   std::vector<Index> rows;
   const Index first = clearance.rows() - std::ssize(samples);

@@ -1,48 +1,32 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Contact pressures, and the projection out of obstacles in the metric of the quasi-Newton model.
-#include "solve/radial/contact_forces.h"
+#include "solve/contact/forces.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "sampling/sample_choice.h"
-#include "solve/radial/contact_rows.h"
 
 namespace arapfields {
 namespace {
 
-/// Gauss–Seidel sweeps for the factors of the surfaces' pressures.
-constexpr int scalings = 20;
-/// Planes whose normals have at least this cosine count as parallel.
-constexpr double parallel_cosine = 0.9;
-/// A projection adds at most `planes_at_once` constraints in each of `searches` rounds; parallel ones are at
-/// least `apart` from each other at rest, in cube units.
-constexpr Index planes_at_once = 60;
-constexpr int searches = 5;
-constexpr double apart = 0.02;
-/// A projection moves no point farther than this times the greatest penetration depth.
-constexpr double farther = 3.0;
-/// Penetration depth beyond a margin that a time step may leave, in cube units.
-constexpr double deep_in_motion = 3.0 * ContactSet::deep;
-/// Tolerance of the projection's gaps, in cube units.
-constexpr double projection_gap = 1e-4;
+using P = ContactParameters;
 
 /// Indices of the planes with the most negative gaps, without near and parallel ones.
 std::vector<Index> deepest_of(const Vector& gaps, const ContactSet& set) {
   std::vector<Index> order;
   for (Index i = 0; i < gaps.size(); ++i)
-    if (gaps[i] < -projection_gap) order.push_back(i);
+    if (gaps[i] < -P::projection_gap) order.push_back(i);
   std::sort(order.begin(), order.end(), [&](Index a, Index b) { return gaps[a] < gaps[b]; });
   std::vector<Index> chosen;
   for (const Index i : order) {
     const auto place = [&](Index k) { return set.places.row(set.planes[static_cast<std::size_t>(k)].first); };
     const bool free = std::none_of(chosen.begin(), chosen.end(), [&](Index k) {
-      return (place(i) - place(k)).squaredNorm() < apart * apart &&
+      return (place(i) - place(k)).squaredNorm() < P::planes_apart * P::planes_apart &&
              set.planes[static_cast<std::size_t>(i)].normal.dot(
-                 set.planes[static_cast<std::size_t>(k)].normal) > parallel_cosine;
+                 set.planes[static_cast<std::size_t>(k)].normal) > P::parallel_cosine;
     });
     if (free) chosen.push_back(i);
-    if (std::ssize(chosen) == planes_at_once) break;
+    if (std::ssize(chosen) == P::planes_in_a_round) break;
   }
   return chosen;
 }
@@ -84,7 +68,7 @@ double update_pressures(RadialState& s) {
 bool is_deep(RadialState& s) {
   const Points places = contact_places(s);
   return std::any_of(s.contact.found().planes.begin(), s.contact.found().planes.end(),
-                     [&](const ContactPlane& p) { return p.gap(places.data()) < -deep_in_motion; });
+                     [&](const ContactPlane& p) { return p.gap(places.data()) < -P::motion_depth; });
 }
 
 void update_balanced_pressures(RadialState& s) {
@@ -115,7 +99,7 @@ void update_balanced_pressures(RadialState& s) {
   const RowMatrix<double> products = each * each.transpose();
   const Vector answer = each * others;
   Vector shares = Vector::Zero(count);
-  for (int sweep = 0; sweep < scalings; ++sweep)
+  for (int sweep = 0; sweep < P::factor_sweeps; ++sweep)
     for (Index k = 0; k < count; ++k) {
       const double left = answer[k] - products.row(k).dot(shares) + products(k, k) * shares[k];
       shares[k] = products(k, k) > 0.0 ? std::clamp(left / products(k, k), 0.0, 1.0) : 0.0;
@@ -131,12 +115,12 @@ void push_out(RadialState& s) {
   VectorF u = s.measurements(s.fast);
   const Points before = objective.contact_values(u).cast<double>();
   const Vector gaps = gaps_of(set, before);
-  const double longest = farther * -gaps.minCoeff();
+  const double longest = P::most_motion * -gaps.minCoeff();
   Vector left = gaps;
   ContactRows rows;
   std::vector<Index> taken;
   RowMatrix<double> step;
-  for (int search = 0; search < searches; ++search) {
+  for (int search = 0; search < P::projection_rounds; ++search) {
     const std::vector<Index> more = deepest_of(left, set);
     if (more.empty()) break;
     std::vector<const ContactPlane*> planes;

@@ -6,21 +6,19 @@
 #include <vector>
 
 #include "fields/influence.h"
-#include "solve/radial/barrier_surface.h"
-#include "solve/radial/contact_points.h"
-#include "solve/radial/contact_sides.h"
+#include "solve/contact/points.h"
+#include "solve/contact/self_crossings.h"
+#include "solve/contact/sides.h"
+#include "solve/contact/surface.h"
 #include "solve/radial/secondary_motion.h"
-#include "solve/radial/self_crossings.h"
 
 namespace arapfields {
 
 /// Contact of a surface with obstacles and itself: finds contact planes and keeps their multipliers. The path
 /// of a point since begin(), relative to an obstacle, tells its side: nothing tunnels through thin obstacles.
-class ContactTerms {
+class ContactConstraints {
  public:
-  /// Safety distance beyond each margin, in cube units, larger than the depth that solves leave.
-  static constexpr double safety_distance = 1.5e-3;
-  explicit ContactTerms(const RadialProblem& problem) : problem_(problem), points_(problem) {}
+  explicit ContactConstraints(const RadialProblem& problem) : problem_(problem), points_(problem) {}
   void prepare(const Progress& progress) { points_.choose(progress); }  ///< the expensive part of set()
   /// Obstacles that have moved keep their placements until move_obstacles(). Throws InvalidInput.
   void set(const std::optional<Contact>& contact, const RowMatrix<double>& coefficients);
@@ -56,7 +54,7 @@ class ContactTerms {
   double restore(ContactSnapshot snapshot, const RowMatrix<double>& coefficients);
   /// The largest speed of a contact point for these rates of the coefficients.
   double fastest(const RowMatrix<double>& rates) {
-    return std::sqrt(points_.at(rates).rowwise().squaredNorm().maxCoeff());
+    return std::sqrt(points_.at(rates, *history_->refined).rowwise().squaredNorm().maxCoeff());
   }
   /// Multiplier update at the positions (n,3) of found()'s points, times a factor for each surface. Returns
   /// the pressures' relative change, 0 to 1.
@@ -73,10 +71,9 @@ class ContactTerms {
   bool ended_at(Revision shape) const { return ended_ == shape; }
 
   const ContactSet& found() const { return found_; }
-  Index sample_of(Index place) const;  ///< row of the problem's samples of a point of found()
   bool has_planes() const { return !found_.planes.empty(); }
   std::string name_of(Index surface) const;
-  const std::vector<BarrierSurface>& surfaces() const { return surfaces_; }  ///< obstacles and the ground
+  const std::vector<ContactSurface>& surfaces() const { return surfaces_; }  ///< obstacles and the ground
   double deepest() const { return deepest_; }
   double deepest_outside() const { return deepest_outside_; }  ///< without self-contact
   /// Whether parts of the surface touched each other at the last search.
@@ -94,22 +91,26 @@ class ContactTerms {
   bool overlaps(const RowMatrix<double>& coefficients);
 
  private:
-  std::vector<BarrierSurface> surfaces_of(const std::optional<Contact>& contact,
+  std::vector<ContactSurface> surfaces_of(const std::optional<Contact>& contact,
                                           const std::optional<Ground>& second_ground);
-  void set_surfaces(std::vector<BarrierSurface> surfaces);
+  void set_surfaces(std::vector<ContactSurface> surfaces);
   void forget();
   auto samples_of(const Points& places) const { return places.topRows(points_.sample_count()); }
+  Points samples_at(const RowMatrix<double>& coefficients) {
+    return samples_of(points_.at(coefficients, {}));
+  }
   std::vector<Index> near_rows() const;
   void find_outside(const std::vector<Index>& rows, std::vector<ContactPlane>& planes);
   Vector add_planes(Index k, const std::vector<Index>& rows, PointsIn now, std::vector<ContactPlane>& planes);
-  std::vector<Index> extend_history(const RowMatrix<double>& coefficients);
+  std::vector<Index> extend_history(const ContactPoints::Refined& refined,
+                                    const RowMatrix<double>& coefficients);
   void add_own_planes(const RowMatrix<double>& coefficients, bool jumped, std::vector<ContactPlane>& planes);
   void set_planes(std::vector<ContactPlane> planes);
 
   const RadialProblem& problem_;
   std::optional<Contact> contact_;
   std::optional<Ground> second_ground_;
-  std::vector<BarrierSurface> surfaces_;
+  std::vector<ContactSurface> surfaces_;
   std::vector<Mat4> starts_;            // placements that move_obstacles() interpolates from
   std::vector<Mat4> ends_;              // and to
   std::vector<Mat4> obstacle_motions_;  // the motions of its last call

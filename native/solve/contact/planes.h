@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/jets.h"
+#include "solve/contact/parameters.h"
 
 namespace arapfields {
 
@@ -46,12 +47,28 @@ struct ContactPlane {
   }
 };
 
-/// Tangential displacement, in cube units, below which friction is quadratic (static) instead of linear.
-constexpr double stuck = 2e-4;
+/// The contact planes (linearised contact constraints) of the last search, and the points that they act on.
+struct ContactSet {
+  std::vector<Index> rows;     ///< rows of ContactPoints, ascending; planes index these
+  std::vector<Index> samples;  ///< the sample that each of these points is, or belongs to
+  Points places;               ///< (n,3) rest positions of these points
+  Points embedded;             ///< (n,3) the same in the basis' interior embedding; empty without one
+  std::vector<ContactPlane> planes;
+  Revision revision = 0;   ///< 0: no planes
+  double stiffness = 0.0;  ///< augmented-Lagrangian: energy ½·stiffness·depth² a unit of area
+
+  /// The fraction of the area in contact: where pressures are positive.
+  double contact_area() const;
+  /// Mean contact force of each surface, (surfaces, 3), near a place; the weights fall off with the distance.
+  Points forces_at(const Vec3& place, const double* now, Index surfaces) const;
+  /// Adapts the stiffness to the mean pressure; raises it if `raise`, else lowers it gradually.
+  void adapt_stiffness(bool raise);
+};
 
 /// The augmented Lagrangian Σ area (max(0, pressure − stiffness·gap)² − pressure²)/(2 stiffness) of the
-/// planes, and friction Σ area·friction·|slip|, smoothed below `stuck` (Li et al. 2020, Incremental potential
-/// contact), at places (n,3) of the surface; adds its cotangents (n,3) (null: the value alone).
+/// planes, and friction Σ area·friction·|slip|, smoothed below ContactParameters::stuck (Li et al. 2020,
+/// Incremental potential contact), at places (n,3) of the surface; adds its cotangents (n,3) (null: the value
+/// alone).
 template <class Scalar>
 ARAPFIELDS_EXPORT_TO_TESTS double contact_energy(const std::vector<ContactPlane>& planes, double stiffness,
                                                  const Scalar* places, Scalar* cotangents);

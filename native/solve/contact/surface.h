@@ -2,16 +2,16 @@
 #pragma once
 
 #include "core/frame.h"
-#include "solve/contact.h"
+#include "solve/contact/contact.h"
 
 namespace arapfields {
 
 /// The signed distance of an obstacle, or of the ground, in the cube coordinates of the deforming surface:
 /// that of the obstacle's implicit function, placed by a similarity.
-class BarrierSurface {
+class ContactSurface {
  public:
-  BarrierSurface(const Obstacle& obstacle, const Frame& frame);
-  static BarrierSurface ground(const Ground& ground, const Frame& frame);
+  ContactSurface(const Obstacle& obstacle, const Frame& frame);
+  static ContactSurface ground(const Ground& ground, const Frame& frame);
 
   struct Nearest {
     Vector distances;  ///< (n) negative inside; to first order, Φ/‖∇Φ‖, if Φ is no distance
@@ -23,7 +23,7 @@ class BarrierSurface {
   /// Interpolates two placements at the parameter `share` in [0, 1].
   void place_between(const Mat4& from, const Mat4& to, double share);
   /// Whether both have the same function, whatever their placements.
-  bool has_same_function(const BarrierSurface& other) const { return function_ == other.function_; }
+  bool has_same_function(const ContactSurface& other) const { return function_ == other.function_; }
   Vector distances(PointsIn points) const;
   Nearest nearest(PointsIn points) const;
   /// Whether it is a sheet without an inside: its distances are unsigned, its normals point to the near side.
@@ -41,7 +41,7 @@ class BarrierSurface {
   std::vector<Hit> first_hits(PointsIn from, PointsIn to) const;
 
  private:
-  BarrierSurface() = default;
+  ContactSurface() = default;
   PointsF in_function(PointsIn points, Vector& beyond, Points* outward) const;
 
   std::shared_ptr<const ImplicitFunction> function_;  // null: the ground

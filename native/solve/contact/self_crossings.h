@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "sampling/oriented_points.h"
-#include "solve/radial/self_contact.h"
+#include "solve/contact/self_contact.h"
 
 namespace arapfields {
 

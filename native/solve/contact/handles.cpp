@@ -1,39 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/radial/handle_bounds.h"
+#include "solve/contact/handles.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <tuple>
+#include <utility>
 
 #include "fields/radial_evaluator.h"
 #include "sampling/oriented_points.h"
 #include "sampling/sample_choice.h"
-#include "solve/radial/contact_forces.h"
+#include "solve/contact/forces.h"
 #include "solve/radial/handle_motion.h"
 
 namespace arapfields {
 namespace {
 
-/// Most bounds in a set (no translation may fulfil all), most sweeps of Hildreth's method for each set, and
-/// the tolerance of bounds, in cube units.
-constexpr std::size_t most_active = 40;
-constexpr int most_sweeps = 200;
-constexpr double bound_tolerance = 1e-6;
-/// A contact point is under a point handle if it is no farther from it than `under` at rest, nor than `aside`
-/// perpendicular to the plane's normal now, in widths of the shape there.
-constexpr double under = 1.5, aside = 0.35;
-/// Motion of a handle, in cube units, below which its weight no longer grows.
-constexpr double unmoved = 1e-3;
-/// Searches for the thickest part of the shape near a point handle, which may lie at a thin edge.
-constexpr int thicker = 3;
-/// Planes of curved solids are linearised anew, at most so many times, until the translation changes by less
-/// than `unchanged`, in cube units.
-constexpr int most_times = 6;
-constexpr double unchanged = 1e-4;
-/// A plane is linearised anew if the translated point is within `near_bound` of it, in cube units, and the
-/// cosine of the new normal with the old one is at least `least_turned`.
-constexpr double near_bound = 0.05, least_turned = 0.0;
+using P = ContactParameters;
 
 /// Weight of each handle: its number of points over its mean squared motion.
 Vector masses_of(const BoundHandles& handles) {
@@ -42,7 +26,7 @@ Vector masses_of(const BoundHandles& handles) {
     const Index begin = handles.begin(i), rows = handles.begin(i + 1) - begin;
     const Points motion =
         handles.targets().middleRows(begin, rows) - handles.sources().middleRows(begin, rows);
-    masses[i] = static_cast<double>(rows) / (motion.rowwise().squaredNorm().mean() + unmoved * unmoved);
+    masses[i] = static_cast<double>(rows) / (motion.rowwise().squaredNorm().mean() + P::unmoved * P::unmoved);
   }
   return masses;
 }
@@ -66,7 +50,7 @@ Vector widths_at(const RadialProblem& problem, const Points& points) {
   Vector widths = 2.0 * problem.shape->thickness->at(points);
   for (Index k = 0; k < points.rows(); ++k) {
     const Vector squares = (problem.surface().rowwise() - points.row(k)).rowwise().squaredNorm();
-    for (int search = 0; search < thicker; ++search) {
+    for (int search = 0; search < P::thickness_searches; ++search) {
       const double square = widths[k] * widths[k];
       for (Index i = 0; i < squares.size(); ++i)
         if (squares[i] < square) widths[k] = std::max(widths[k], 2.0 * thickness[i]);
@@ -84,7 +68,58 @@ const std::vector<Index>& mirror_samples(RadialState& s) {
   });
 }
 
-}  // namespace
+/// Contact constraints on the translations of handles: a translation is feasible if it brings all points that
+/// the handle holds, moved rigidly by the handle's motion, to the feasible side of the contact planes.
+class HandleBounds {
+ public:
+  HandleBounds(RadialState& state, const std::vector<Mat4>& motions);
+  /// The feasible translation t of least norm, and the surface of the largest multiplier; −1: t is zero.
+  std::pair<Vec3, Index> least_translation(Index handle);
+
+ private:
+  /// The constraint normal·t ≥ depth on a translation t.
+  struct Bound {
+    Vec3 normal;
+    double depth;
+    Index surface;
+    std::optional<Vec3> target = std::nullopt;  ///< the point's position under the motion; none: fixed normal
+    bool mirrored = false;                      ///< of the plane's reflection (symmetric fields)
+  };
+  /// A point handle. The shape between it and the contact planes below keeps its width.
+  struct Pin {
+    Index handle;
+    Vec3 rest;
+    Vec3 now;
+    Vec3 target;
+    double width;  ///< of the shape at the handle, in cube units
+  };
+  /// A point of a contact plane, or its reflection, and the handle that holds it; −1: none.
+  struct Place {
+    Vec3 rest;
+    Vec3 now;
+    Index holder;
+  };
+
+  static std::pair<Vec3, Index> solve(const std::vector<Bound>& bounds);
+  static double depth_of(const Pin& pin, const Vec3& normal, double offset, const Place& place);
+  std::vector<Pin> pins() const;
+  Vec3 reflected(Vec3 arm, bool mirrored) const;
+  Place place_of(Index row, bool mirrored) const;
+  Vec3 target_of(const Place& place) const;
+  void bind(const ContactPlane& plane, bool mirrored);
+  void bind_to_surface(const ContactPlane& plane, const Vec3& normal, const Place& place, bool mirrored);
+  void bind_to_itself(const ContactPlane& plane, const Vec3& normal, const Place& first, const Place& second);
+  std::vector<Bound>& bounds_of(Index handle) { return bounds_[static_cast<std::size_t>(handle)]; }
+  bool linearise_anew(std::vector<Bound>& bounds, const Vec3& translation) const;
+
+  RadialState& state_;
+  const std::vector<Mat4>& motions_;
+  const std::vector<Index>& holders_;
+  Vector masses_;  // weight of each handle: of two that meet, the lighter one moves more
+  std::vector<Pin> pins_;
+  Points places_;  // current positions of the contact set's points; empty without pins
+  std::vector<std::vector<Bound>> bounds_;
+};
 
 HandleBounds::HandleBounds(RadialState& state, const std::vector<Mat4>& motions)
     : state_(state), motions_(motions), holders_(holders(state)), bounds_(motions.size()) {
@@ -124,7 +159,7 @@ double HandleBounds::depth_of(const Pin& pin, const Vec3& normal, double offset,
   const double length = (place.rest - pin.rest).norm();
   const Vec3 arm = place.now - pin.now;
   const double along = normal.dot(arm);
-  if (length > under * pin.width || (arm - along * normal).norm() > aside * pin.width)
+  if (length > P::under_pin * pin.width || (arm - along * normal).norm() > P::aside_of_pin * pin.width)
     return -std::numeric_limits<double>::infinity();
   const double longer = arm.norm() > 0.0 ? length / arm.norm() : 1.0;
   return offset - normal.dot(pin.target) - longer * along;
@@ -136,7 +171,7 @@ Vec3 HandleBounds::reflected(Vec3 arm, bool mirrored) const {
 }
 
 HandleBounds::Place HandleBounds::place_of(Index row, bool mirrored) const {
-  Index sample = state_.contact.sample_of(row);
+  Index sample = state_.contact.found().samples[static_cast<std::size_t>(row)];
   if (mirrored) sample = mirror_samples(state_)[static_cast<std::size_t>(sample)];
   return {reflected(state_.contact.found().places.row(row), mirrored),
           pins_.empty() ? Vec3(Vec3::Zero()) : reflected(places_.row(row), mirrored),
@@ -182,17 +217,17 @@ std::pair<Vec3, Index> HandleBounds::solve(const std::vector<Bound>& bounds) {
   std::vector<double> multipliers(bounds.size(), 0.0);
   std::vector<std::size_t> active;
   for (;;) {
-    double most = bound_tolerance;
+    double most = P::bound_tolerance;
     std::size_t worst = bounds.size();
     for (std::size_t k = 0; k < bounds.size(); ++k)
       if (const double depth = bounds[k].depth - bounds[k].normal.dot(translation); depth > most)
         most = depth, worst = k;
-    if (worst == bounds.size() || active.size() == most_active ||
+    if (worst == bounds.size() || active.size() == P::most_bounds ||
         std::find(active.begin(), active.end(), worst) != active.end())
       break;
     active.push_back(worst);
-    double change = bound_tolerance;
-    for (int sweep = 0; sweep < most_sweeps && change >= bound_tolerance; ++sweep) {
+    double change = P::bound_tolerance;
+    for (int sweep = 0; sweep < P::bound_sweeps && change >= P::bound_tolerance; ++sweep) {
       change = 0.0;
       for (const std::size_t k : active) {
         const double next =
@@ -215,26 +250,25 @@ bool HandleBounds::linearise_anew(std::vector<Bound>& bounds, const Vec3& transl
   const double length = translation.norm();  // no point comes nearer by more
   bool any = false;
   for (Index k = 0; k < std::ssize(s.contact.surfaces()); ++k) {
-    const BarrierSurface& surface = s.contact.surfaces()[static_cast<std::size_t>(k)];
+    const ContactSurface& surface = s.contact.surfaces()[static_cast<std::size_t>(k)];
     if (surface.is_ground() || surface.is_sheet()) continue;
     std::vector<Bound*> of;
     for (Bound& bound : bounds)
       if (bound.surface == k && bound.target && bound.depth > -length &&
-          bound.normal.dot(translation) - bound.depth < near_bound)
+          bound.normal.dot(translation) - bound.depth < P::linearised_distance)
         of.push_back(&bound);
     if (of.empty()) continue;
     Points places(std::ssize(of), 3);
     for (std::size_t m = 0; m < of.size(); ++m)
       places.row(static_cast<Index>(m)) =
           reflected(*of[m]->target + translation, of[m]->mirrored).transpose();
-    const BarrierSurface::Nearest there = surface.nearest(places);
+    const ContactSurface::Nearest there = surface.nearest(places);
     for (std::size_t m = 0; m < of.size(); ++m) {
       const auto row = static_cast<Index>(m);
       const Vec3 normal = reflected(there.normals.row(row).transpose(), of[m]->mirrored);
-      if (normal.dot(of[m]->normal) < least_turned) continue;
+      if (normal.dot(of[m]->normal) < 0.0) continue;
       of[m]->normal = normal;
-      of[m]->depth =
-          normal.dot(translation) - there.distances[row] + surface.margin() + ContactTerms::safety_distance;
+      of[m]->depth = normal.dot(translation) - there.distances[row] + surface.margin() + P::safety_distance;
       any = true;
     }
   }
@@ -244,12 +278,76 @@ bool HandleBounds::linearise_anew(std::vector<Bound>& bounds, const Vec3& transl
 std::pair<Vec3, Index> HandleBounds::least_translation(Index handle) {
   std::vector<Bound>& bounds = bounds_of(handle);
   auto [translation, surface] = solve(bounds);
-  for (int times = 0; surface >= 0 && times < most_times && linearise_anew(bounds, translation); ++times) {
+  for (int times = 0; surface >= 0 && times < P::most_linearisations && linearise_anew(bounds, translation);
+       ++times) {
     const Vec3 last = translation;
     std::tie(translation, surface) = solve(bounds);
-    if ((translation - last).norm() < unchanged) break;
+    if ((translation - last).norm() < P::linearisation_tolerance) break;
   }
   return {translation, surface};
+}
+
+}  // namespace
+
+std::vector<Index> hold_back(RadialState& s, std::vector<Mat4>& motions) {
+  std::vector<Index> by(motions.size(), -1);
+  if (motions.empty() || !s.contact.has_planes()) return by;
+  HandleBounds bounds(s, motions);
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const auto [translation, surface] = bounds.least_translation(static_cast<Index>(i));
+    motions[i].topRightCorner<3, 1>() += translation;
+    by[i] = surface;
+  }
+  return by;
+}
+
+std::vector<Index> set_reachable_targets(RadialState& s, std::vector<Mat4> motions, Pull pull) {
+  const std::vector<Index> by = hold_back(s, motions);
+  Points targets = s.handles.targets_at(motions);
+  RadialObjective<float>& objective = *s.fast.objective.latest();
+  const bool pulls_short = pull != Pull::full && s.contact.itself() && s.handles.any();
+  const Index own = pulls_short ? s.handles.own_count() : 0;
+  const Index itself = s.contact.surface_count() - 1;
+  const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();
+  for (Index first = 0, last = 0; first < own; first = last) {
+    const Index handle = s.handles.handle_of(first);
+    while (last < own && s.handles.handle_of(last) == handle) ++last;
+    if (pull != Pull::short_for_all && by[static_cast<std::size_t>(handle)] != itself) continue;
+    const Points left = (targets - values).middleRows(first, last - first);
+    const double length = std::sqrt(left.rowwise().squaredNorm().mean());
+    if (length > P::longest_pull)
+      targets.middleRows(first, last - first) =
+          values.middleRows(first, last - first) + P::longest_pull / length * left;
+  }
+  objective.set_targets(targets);
+  return by;
+}
+
+std::vector<HeldBack> held_back_handles(RadialState& s, const std::vector<Index>& by) {
+  std::vector<HeldBack> result;
+  const RadialObjective<float>& objective = s.objective(s.fast);  // with the planes of the last search
+  const Points values = objective.handle_values(s.measurements(s.fast)).cast<double>();
+  const Points& targets = s.handles.pairs().targets;
+  const Index own = s.handles.any() ? s.handles.own_count() : 0;
+  Points places;  // of the planes
+  for (Index first = 0, last = 0; first < own; first = last) {
+    const Index handle = s.handles.handle_of(first);
+    while (last < own && s.handles.handle_of(last) == handle) ++last;
+    const Points left = (targets - values).middleRows(first, last - first);
+    const double distance = left.rowwise().norm().mean();
+    if (distance < P::held_back || !s.contact.has_planes()) continue;
+    if (places.rows() == 0) places = contact_places(s);
+    const Vec3 middle = values.middleRows(first, last - first).colwise().mean();
+    const Vector along = s.contact.found().forces_at(middle, places.data(), s.contact.surface_count()) *
+                         left.colwise().mean().transpose();
+    Index most = 0;
+    const bool pressed = along.minCoeff(&most) < 0.0;
+    const Index back = by[static_cast<std::size_t>(handle)];
+    if (back >= 0 || pressed)
+      result.push_back(
+          {handle, s.contact.name_of(back >= 0 ? back : most), s.problem.frame().scale * distance});
+  }
+  return result;
 }
 
 }  // namespace arapfields

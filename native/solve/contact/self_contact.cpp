@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/radial/self_contact.h"
+#include "solve/contact/self_contact.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,37 +12,15 @@
 #include "fields/radial_evaluator.h"
 #include "sampling/oriented_points.h"
 #include "sampling/sample_choice.h"
+#include "solve/contact/parameters.h"
 
 namespace arapfields {
 namespace {
 
-/// Least distance through the inside of the shape at rest, in cube units, of two samples in contact: basis
-/// functions are too wide to separate the sides of a crease or of the web between two fingers.
-constexpr double far_inside = 0.15;
-/// Largest cosine of the normals of two samples that face each other.
-constexpr double facing = -0.1;
-/// Largest distance, in cube units, at which gaps at rest are searched for.
-constexpr double near_at_rest = 0.05;
-/// Penetration depth, in cube units, that a solved shape may have where tracking starts at it.
-constexpr double shallow = 0.01;
-/// Largest tangential offset of a pair, in sample spacings.
-constexpr double spacings_aside = 2.0;
-/// Samples at which overlaps() takes winding numbers, and their change since rest that means "inside another
-/// part", where they increase, or "pressed flat".
-constexpr Index most_probes = 500;
-constexpr double inside_another = 0.6;
-/// The same above a sample that has entered another part: less, as winding numbers are smoothed there.
-constexpr double entered = 0.4;
-/// Winding number above a sample at rest from which it is inside another part.
-constexpr double inside = 0.5;
-/// Where parts intersect at rest, two samples that are nearer at rest, in cube units, are excluded if one is
-/// within the safety distance of the other's plane or behind it: the interior embedding, a function of the
-/// place, cannot tell overlapping parts apart. Probes nearer to an intersection are left out.
-constexpr double near_a_cut = 0.1;
+using P = ContactParameters;
+
 /// Signs of the offset along the normal.
 constexpr double outwards = 1.0, inwards = -1.0;
-/// Offset between meshes in the search structure's coordinates, which keeps them far from each other.
-constexpr double meshes_apart = 10.0;
 
 /// The blocks of a RadialEvaluator that contain these rows (ascending).
 std::vector<Index> blocks_of(const std::vector<Index>& rows) {
@@ -76,21 +54,22 @@ SelfContact::SelfContact(const RadialProblem& problem, const std::vector<Index>&
   normals_ = normals;
   RowMatrix<double> rest = RowMatrix<double>::Zero(n, 8);
   rest.leftCols(6) = inside_;
-  for (std::size_t i = 0; i < meshes_.size(); ++i) rest(static_cast<Index>(i), 6) = meshes_apart * meshes_[i];
-  runs_.emplace(std::move(rest), far_inside);
-  const PointGrid grid(places, near_at_rest);  // a cell holds about near_at_rest² of the surface's area
+  for (std::size_t i = 0; i < meshes_.size(); ++i)
+    rest(static_cast<Index>(i), 6) = P::meshes_apart * meshes_[i];
+  runs_.emplace(std::move(rest), P::far_inside);
+  const PointGrid grid(places, P::gap_at_rest);  // a cell holds about gap_at_rest² of the surface's area
   const double share = static_cast<double>(grid.size()) / static_cast<double>(n);
-  most_offset_ = spacings_aside * near_at_rest * std::sqrt(share);
+  most_offset_ = P::most_offset * P::gap_at_rest * std::sqrt(share);
   safety_distance_ = safety_distance;
-  for (Index i = 0; i < n; i += std::max<Index>(1, n / most_probes)) probes_.push_back(i);
+  for (Index i = 0; i < n; i += std::max<Index>(1, n / P::most_probes)) probes_.push_back(i);
   measure_rest(places);
   least_gaps_ = Vector::Constant(n, safety_distance);
   Vector at_rest = least_gaps_;
   for (const FacingPair& pair :
-       search(places, [&](auto*) { return normals; }, near_at_rest, Penetrations::at_rest))
+       search(places, [&](auto*) { return normals; }, P::gap_at_rest, Penetrations::at_rest))
     for (const Index i : {pair.first, pair.second})
       at_rest[i] = std::min(at_rest[i], std::max(0.0, pair.gap));
-  least_gaps_ = (windings_above_.array() > inside).select(0.0, at_rest);
+  least_gaps_ = (windings_above_.array() > P::inside_at_rest).select(0.0, at_rest);
 }
 
 /// Scales the winding numbers to a jump of 1 across the surface, and computes those at rest.
@@ -107,7 +86,7 @@ void SelfContact::measure_rest(PointsIn places) {
   winding_scale_ = 1.0 / std::max(jumps[half], 1e-12);  // the median jump becomes 1
   windings_below_ *= winding_scale_;
   windings_above_ *= winding_scale_;
-  is_cut_ = windings_below_.maxCoeff() > 1.0 + inside_another;
+  is_cut_ = windings_below_.maxCoeff() > 1.0 + P::inside_another;
   if (is_cut_) find_cuts(places);
 }
 
@@ -115,7 +94,7 @@ void SelfContact::measure_rest(PointsIn places) {
 void SelfContact::find_cuts(PointsIn places) {
   std::vector<Index> within, kept;
   for (Index i = 0; i < windings_above_.size(); ++i)
-    if (windings_above_[i] > inside) within.push_back(i);
+    if (windings_above_[i] > P::inside_at_rest) within.push_back(i);
   if (within.empty()) return;
   const auto alike = [](const Points& points) -> Points { return Points::Zero(points.rows(), 3); };
   const Points cuts = rows_of(places, within);
@@ -123,7 +102,7 @@ void SelfContact::find_cuts(PointsIn places) {
   std::vector<Index> probes;
   for (Index k = 0; k < windings_below_.size(); ++k) {
     const Index i = probes_[static_cast<std::size_t>(k)];
-    if ((places.row(i) - cuts_.row(i)).norm() < near_a_cut) continue;
+    if ((places.row(i) - cuts_.row(i)).norm() < P::near_a_cut) continue;
     kept.push_back(k);
     probes.push_back(i);
   }
@@ -143,29 +122,30 @@ bool SelfContact::is_cut(Index i, Index j) const {
   if (!is_cut_) return false;
   const auto at = [&](Index k) { return inside_.row(k).leftCols<3>(); };
   const Vec3 arm = (at(i) - at(j)).transpose();
-  if (arm.squaredNorm() < near_a_cut * near_a_cut &&
+  if (arm.squaredNorm() < P::near_a_cut * P::near_a_cut &&
       std::min(normals_.row(j).dot(arm), -normals_.row(i).dot(arm)) < safety_distance_)
     return true;
   return cuts_.rows() > 0 && (at(i) - cuts_.row(i)).norm() + (cuts_.row(i) - cuts_.row(j)).norm() +
                                      (cuts_.row(j) - at(j)).norm() <
-                                 far_inside;
+                                 P::far_inside;
 }
 
 /// Whether sample i, behind sample j's tangent plane, has passed through it: at the last search i was paired
 /// with the same part, or in front of j.
 bool SelfContact::came_through(Index i, Index j, const Vec3& normal, const Search& last) const {
   const Index before = last.faced[static_cast<std::size_t>(i)];
-  return (before >= 0 && !is_far(before, j, far_inside)) ||
+  return (before >= 0 && !is_far(before, j, P::far_inside)) ||
          (last.places.row(i) - last.places.row(j)).dot(normal.transpose()) >= 0.0;
 }
 
 bool SelfContact::may_meet(Index i, Index j) const {
-  return least_gaps_[i] > 0.0 && least_gaps_[j] > 0.0 && is_far(i, j, far_inside) && !is_cut(i, j);
+  return least_gaps_[i] > 0.0 && least_gaps_[j] > 0.0 && is_far(i, j, P::far_inside) && !is_cut(i, j);
 }
 
 std::vector<bool> SelfContact::beside_others(PointsIn places, double near) const {
   std::vector<bool> result(static_cast<std::size_t>(places.rows()));
-  const auto near_to = runs_->meeting(places, Points(0, 3), least_gaps_.array() > 0.0, near, facing);
+  const auto near_to =
+      runs_->meeting(places, Points(0, 3), least_gaps_.array() > 0.0, near, P::facing_cosine);
   for (Index run = 0; run < runs_->count(); ++run)
     for (const Index i : runs_->samples(run))
       result[static_cast<std::size_t>(i)] = !near_to[static_cast<std::size_t>(run)].empty();
@@ -181,7 +161,7 @@ bool SelfContact::is_gap(double gap, Index i, Index j, const Vec3& normal, Penet
     case Penetrations::as_came:
       return gap >= 0.0 || came_through(i, j, normal, last);
     case Penetrations::shallow:
-      return gap >= -shallow;
+      return gap >= -P::shallow;
     default:
       return true;
   }
@@ -201,7 +181,7 @@ Index SelfContact::faced_by(Index i, const std::vector<Index>& runs, PointsIn pl
       if (square >= nearest) continue;
       const Vec3 other = normals.row(j).transpose();
       const double gap = arm.dot(other);
-      if (normal.dot(other) > facing || square - gap * gap > most_offset_ * most_offset_) continue;
+      if (normal.dot(other) > P::facing_cosine || square - gap * gap > most_offset_ * most_offset_) continue;
       if (-gap > std::min(widths_[i], widths_[j]) || !may_meet(i, j)) continue;
       if (!is_gap(gap, i, j, other, penetrations, last)) continue;
       nearest = square;
@@ -216,7 +196,7 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
   if (std::exchange(penetrates_, false)) areas = normals_at(nullptr);
   Points normals = unit_rows(areas);
   const std::vector<std::vector<Index>> near_to =
-      runs_->meeting(places, normals, least_gaps_.array() > 0.0, near, facing);
+      runs_->meeting(places, normals, least_gaps_.array() > 0.0, near, P::facing_cosine);
   std::vector<Index> runs, samples;
   for (Index run = 0; run < runs_->count(); ++run) {
     if (near_to[static_cast<std::size_t>(run)].empty()) continue;
@@ -253,7 +233,7 @@ std::vector<FacingPair> SelfContact::search(PointsIn places, const Normals& norm
     if (areas.rows() == 0) areas = normals_at(nullptr);
     const SampleWindings now(places, winding_scale_ * areas, most_offset_);
     look(Penetrations::none, [&](Index i) {  // outside by its winding number: opposite sides of one thin part
-      return penetrates(i) && winding(now, i, outwards, places, areas) - windings_above_[i] < entered;
+      return penetrates(i) && winding(now, i, outwards, places, areas) - windings_above_[i] < P::entered;
     });
   }
   std::vector<FacingPair> pairs;
@@ -286,7 +266,7 @@ bool SelfContact::overlaps(PointsIn places, PointsIn normals) const {
   if (probes_.empty()) return false;
   const SampleWindings now(places, winding_scale_ * normals, most_offset_);
   const Vector change = windings_below(now, places, normals) - windings_below_;
-  return change.lpNorm<Eigen::Infinity>() > inside_another;
+  return change.lpNorm<Eigen::Infinity>() > P::inside_another;
 }
 
 SelfContact::Search SelfContact::search_of(PointsIn places, const std::vector<FacingPair>& pairs) {
@@ -296,7 +276,7 @@ SelfContact::Search SelfContact::search_of(PointsIn places, const std::vector<Fa
 }
 
 SelfContact::Search SelfContact::begin(PointsIn places, const Normals& normals) {
-  return search_of(places, search(places, normals, near_at_rest, Penetrations::shallow));
+  return search_of(places, search(places, normals, P::gap_at_rest, Penetrations::shallow));
 }
 
 std::vector<FacingPair> SelfContact::find(PointsIn places, const Normals& normals, double near, bool jumped,

@@ -4,31 +4,12 @@
 #include <limits>
 #include <vector>
 
-#include "energies/contact.h"
-#include "solve/radial/barrier_surface.h"
-#include "solve/radial/contact_points.h"
-#include "solve/radial/self_contact.h"
+#include "solve/contact/planes.h"
+#include "solve/contact/points.h"
+#include "solve/contact/self_contact.h"
+#include "solve/contact/surface.h"
 
 namespace arapfields {
-
-/// The contact planes (linearised contact constraints) of the last search, and the points that they act on.
-struct ContactSet {
-  std::vector<Index> rows;  ///< rows of ContactPoints, ascending; planes index these
-  Points places;            ///< (n,3) rest positions of these points
-  Points embedded;          ///< (n,3) the same in the basis' interior embedding; empty without one
-  std::vector<ContactPlane> planes;
-  Revision revision = 0;                  ///< 0: no planes
-  double stiffness = 0.0;                 ///< augmented-Lagrangian: energy ½·stiffness·depth² a unit of area
-  static constexpr double softest = 5e4;  ///< initial and least stiffness
-  static constexpr double deep = 5e-4;    ///< tolerance of the depth beyond a margin, in cube units
-
-  /// The fraction of the area in contact: where pressures are positive.
-  double contact_area() const;
-  /// Mean contact force of each surface, (surfaces, 3), near a place; the weights fall off with the distance.
-  Points forces_at(const Vec3& place, const double* now, Index surfaces) const;
-  /// Adapts the stiffness to the mean pressure; raises it if `raise`, else lowers it gradually.
-  void adapt_stiffness(bool raise);
-};
 
 /// The sides of each surface that contact points are on: their last positions outside it, and friction's
 /// anchors. `outside` and `anchors` move with the surface.
@@ -45,10 +26,10 @@ struct ContactSides {
   /// For so many points and surfaces, of which start() is needed.
   ContactSides(Index points, std::size_t surfaces);
   /// Starts the tracking of a surface's sides at these places.
-  void start(Index surface, const BarrierSurface& obstacle, PointsIn places);
+  void start(Index surface, const ContactSurface& obstacle, PointsIn places);
   /// Finds where the obstacle crosses the deforming surface; points inside it there are left_inside.
-  void find_crossings(Index surface, const BarrierSurface& obstacle, const ContactPoints& points,
-                      PointsIn places);
+  void find_crossings(Index surface, const ContactSurface& obstacle, const ContactPoints& points,
+                      const RefinedPoints& refined, PointsIn places);
   /// Obstacles with points that are left_inside.
   std::vector<Index> crossing_surfaces() const;
   bool crosses(Index surface, Index sample) const {
@@ -60,21 +41,21 @@ struct ContactSides {
   /// Appends points with copies of these rows.
   void add(const std::vector<Index>& like);
   /// Starts the points appended last at their own places, where their samples are `crossed`.
-  void begin_beside_crossings(Index surface, const BarrierSurface& obstacle,
+  void begin_beside_crossings(Index surface, const ContactSurface& obstacle,
                               const std::vector<Index>& samples, PointsIn places);
 };
 
 /// What contact remembers of each of its points, and which points these are: a solve is rolled back to it as
 /// a whole.
 struct ContactHistory {
-  std::vector<Index> refined;  ///< ContactPoints::refined()
-  Points places;               ///< (points,3) positions at the last search
+  ContactPoints::Refined refined = ContactPoints::unrefined();
+  Points places;  ///< (points,3) positions at the last search
   ContactSides sides;
   RowMatrix<double> pressures;  ///< (points, surfaces and the shape itself) multipliers
   SelfContact::Search itself;   ///< empty without self-contact
 };
 
-/// The contact state that a solve can be rolled back to.
+/// The contact state that a solve can be rolled back to, whatever has been refined since.
 struct ContactSnapshot {
   ContactHistory history;
   double stiffness = 0.0;

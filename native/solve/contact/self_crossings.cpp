@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "solve/radial/self_crossings.h"
+#include "solve/contact/self_crossings.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -10,13 +10,12 @@
 #include "distance/triangle_crossings.h"
 #include "mesh/is_closed.h"
 #include "sampling/sample_choice.h"
+#include "solve/contact/parameters.h"
 
 namespace arapfields {
 namespace {
 
-/// Triangles whose corners are within `reach` of a contact sample at rest, in sample spacings, are looked at
-/// where that sample is within `near` of one of another part; all others always.
-constexpr double reach = 1.5, near = 6.0;
+using P = ContactParameters;
 
 }  // namespace
 
@@ -62,7 +61,7 @@ const SelfCrossings::Mesh& SelfCrossings::mesh() {
   for (Index t = 0; t < count; ++t)
     for (int k = 0; k < 3; ++k)
       if ((mesh_->rest.row(mesh.triangles(t, k)) - samples_.row(mesh_->owners[static_cast<std::size_t>(t)]))
-              .norm() > reach * spacing_)
+              .norm() > P::triangle_reach * spacing_)
         mesh_->reaching[static_cast<std::size_t>(t)] = true;
   return *mesh_;
 }
@@ -70,7 +69,7 @@ const SelfCrossings::Mesh& SelfCrossings::mesh() {
 std::vector<SelfCrossing> SelfCrossings::find(const SelfContact& contact, PointsIn places, const Field& field,
                                               const Progress& progress) {
   if (!knows_mesh()) return {};
-  const std::vector<bool> beside = contact.beside_others(places, near * spacing_);
+  const std::vector<bool> beside = contact.beside_others(places, P::crossing_distance * spacing_);
   if (std::find(beside.begin(), beside.end(), true) == beside.end()) return {};
   const Mesh& known = mesh();
   const Triangles& triangles = problem_.samples.mesh->triangles;
