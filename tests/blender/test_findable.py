@@ -32,6 +32,7 @@ OPERATORS = (
     "STYLIZE",
     "SKIN",
     "LIVE_KEEP",
+    "REMOVE_RESULT",
     "BAKE",
     "FIT",
 )
