@@ -208,6 +208,7 @@ class Session:
                 self.touching = None  # of the shape before; solving this request finds its own
             else:
                 self.is_quiet = self.go_back(request)
+            self.solver.returns = self.is_quiet
             if self.playback.begin(request, frame):
                 self.worker.request(request)
         self.playback.advance(self.requested, frame)

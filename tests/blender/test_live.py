@@ -16,6 +16,7 @@ if IN_BLENDER:
     from addon.core.geometry import spaces
     from addon.core.runtime import jobs
     from addon.live import sessions
+    from addon.live.live_solver import LiveSolver
 
 pytestmark = pytest.mark.in_blender
 
@@ -191,3 +192,37 @@ def test_a_look_at_handles_that_rest_computes_no_motion_again():
         moving.location.z += 0.1234  # as no other test moves it
         step()
         assert computed.called
+
+
+def test_a_cancelled_move_leaves_no_trace_in_the_solver():
+    """What comes back to a pose whose shape is known is solved as if it had never left."""
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.ops.mesh.primitive_cube_add(size=0.3, location=(0, 0, 0.9))
+    scenes.activate(bar)
+    bpy.context.object.select_set(True)
+    bpy.data.objects["Cube"].select_set(True)
+    bpy.ops.arapfields.add_obstacle()
+    moving.location.z += 0.3
+    bpy.context.view_layer.update()
+    bpy.ops.arapfields.live()
+    step(refined=True)
+    session = sessions.live[bar.session_uid]
+    asked = []
+    session.worker.request, given = asked.append, session.worker.request
+    cube = bpy.data.objects["Cube"]
+    for x, z in ((0.3, 0.0), (0.0, 0.9)):  # through the bar, and back
+        cube.location = (x, 0, z)
+        bpy.context.view_layer.update()
+        session.update(bpy.context)
+        assert session.solver.returns == (z == 0.9)
+    session.worker.request = given
+    session.worker.stop()
+    solver = session.solver
+    solver.returns = False
+    away = [*solver.solve(asked[0])][-1].points
+    solver.returns = True
+    back = [*solver.solve(asked[1])][-1].points
+    fresh = LiveSolver(session.reader)
+    fresh.prepare()
+    other = [*fresh.solve(asked[1])][-1].points
+    assert np.abs(away - back).max() > 0.01 and (back == other).all()
