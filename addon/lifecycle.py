@@ -28,6 +28,7 @@ from .solver import style_object
 from .surface import staleness
 from .viewport import handle_boxes, previews
 from .wrap import drawing as landmark_drawing
+from .wrap import landmarks
 
 
 @persistent
@@ -164,6 +165,7 @@ STATE += (
     status,
     symmetry.planes,
     first_run.welcome,
+    landmarks.nearest,
 )
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread

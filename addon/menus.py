@@ -26,7 +26,7 @@ class ARAPFIELDS_MT_object(bpy.types.Menu):
         layout.separator()
         layout.operator(Op.DEFORM, icon="MOD_SIMPLEDEFORM")
         icon = "PAUSE" if sessions.is_live(source, "DEFORM") else "PLAY"
-        layout.operator(Op.LIVE, text="Live Deform", icon=icon).kind = "DEFORM"
+        layout.operator(Op.LIVE, text="Pose", icon=icon).kind = "DEFORM"
         layout.operator(Op.STYLIZE, icon="MOD_EDGESPLIT")
         icon = "PAUSE" if sessions.is_live(source, "STYLIZE") else "PLAY"
         layout.operator(Op.LIVE, text="Live Stylize", icon=icon).kind = "STYLIZE"
@@ -45,6 +45,7 @@ class ARAPFIELDS_MT_object(bpy.types.Menu):
         layout.operator(Op.SAVE_POSE, icon="FILE_TICK")
         layout.operator(Op.APPLY_POSE, icon="CHECKMARK")
         layout.operator(Op.APPLY_KEY, icon="SHAPEKEY_DATA")
+        layout.operator_menu_enum(Op.REMOVE_RESULT, "kind", icon="X")
         layout.operator(Op.REMOVE_FIELD, text="Remove ARAP Fields Modifier", icon="X")
 
 

@@ -82,6 +82,7 @@ class Op(StrEnum):
     LIVE_KEEP = "arapfields.live_keep"
     APPLY_KEY = "arapfields.apply_as_shape_key"
     REMOVE_FIELD = "arapfields.remove_field"
+    REMOVE_RESULT = "arapfields.remove_result"
     MIRROR_HANDLE = "arapfields.mirror_handle"
     BAKE = "arapfields.bake"
     FIELD_NODES = "arapfields.field_as_nodes"

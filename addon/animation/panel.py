@@ -39,7 +39,6 @@ class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
             layout.prop(modifier, "filepath", text="")
             note(layout, played.problem(source))
         layout.menu("ARAPFIELDS_MT_export", icon="EXPORT")
-        layout.operator(Op.FIELD_NODES, icon="GEOMETRY_NODES")
 
 
 def weight(context, source, bake):

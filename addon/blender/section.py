@@ -149,20 +149,23 @@ def note(layout, *reasons):
 
 
 def job_button(layout, operator, icon):
-    """Draws a job's button and its menu of scopes, or the job's progress while it runs."""
-    row, job = layout.row(align=True), jobs.running()
-    group, name = operator.split(".")
-    if job is not None and job.title == getattr(bpy.types, f"{group.upper()}_OT_{name}").title:
-        progress_row(row, job)
+    """Draws a job's button and its menu of scopes; while it runs, the one that cancels it. The status bar has
+    the progress."""
+    row = layout.row(align=True)
+    if cancel_button(row, operator):
         return
     row.operator(operator, icon=icon if characters() >= NARROW else "NONE")
     row.operator_menu_enum(operator, "scope", text="", icon="DOWNARROW_HLT")
 
 
-def progress_row(row, job):
-    """Draws the job's progress and the cancel button."""
-    row.progress(factor=job.fraction, text=f"{translated(job.title)} {job.fraction:.0%}")
-    row.operator(Op.CANCEL, text="", icon="X")
+def cancel_button(row, operator):
+    """Draws the button that cancels the running job, if that is of this operator; returns whether it is."""
+    group, name = operator.split(".")
+    job = jobs.running()
+    if job is None or job.title != getattr(bpy.types, f"{group.upper()}_OT_{name}").title:
+        return False
+    row.operator(Op.CANCEL, text=translated("Cancel {job}", job=translated(job.title)), icon="X")
+    return True
 
 
 def presets(layout, name):

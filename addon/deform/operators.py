@@ -18,7 +18,7 @@ from .solve_job import SolveOperator, plan_solve_job
 
 
 class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
-    """Deform the object as rigidly as its handles allow"""
+    """Solve the pose of the handles finely, as rigidly as they allow; a live shape stays, improved"""
 
     bl_label = "Deform"
     bl_options = {"UNDO"}

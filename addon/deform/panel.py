@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender.section import Advanced, Section, job_button, note, presets, settings_column
+from ..blender.section import Advanced, Section, draw_settings, note, presets, settings_column
 from ..core.geometry.handles import nothing_held
 from ..core.settings.parameters import DEFORM
 from ..handles import empties, symmetry
-from ..live.panel import live_buttons, playback_progress
-from ..names import Op
+from ..live.panel import playback_progress, pose_button, result_row
 from ..results.placement import placement_refusal, replaced_by
 
 
@@ -20,8 +19,8 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
 
     def fill(self, context, source, settings):
         layout = self.layout
-        live_buttons(layout, source, "DEFORM", empties.require_handles(source))
-        job_button(layout, Op.DEFORM, "MOD_SIMPLEDEFORM")
+        pose_button(layout, source, empties.require_handles(source))
+        result_row(layout, source, "DEFORM")
         settings_column(layout, settings.deform, DEFORM, advanced=False)
         playback_progress(layout, source, "DEFORM")
         note(layout, symmetry.beside(source))
@@ -38,6 +37,8 @@ class ARAPFIELDS_PT_deform_settings(Advanced, bpy.types.Panel):
     tasks = frozenset({"POSE"})
 
     def fill(self, context, source, settings):
+        if 0 <= settings.active_handle < len(settings.handles):  # the one chosen in the list
+            draw_settings(self.layout, settings.handles[settings.active_handle], "weight")
         settings_column(self.layout, settings.deform, DEFORM, advanced=True)
 
 

@@ -9,6 +9,8 @@ import contextlib
 from itertools import count
 from typing import NamedTuple
 
+import numpy as np
+
 from ..blender import mesh_arrays, modifier_stack, undo_steps
 from ..blender.object_references import settings_of
 from ..blender.splat_layouts import holds_splats
@@ -118,6 +120,27 @@ def put_back(context, source, way):
         uncover(source, baked=True)
     if playing:
         cache_modifier.set_playing(source, True)
+
+
+def carrying(source, kind):
+    """The modifier with a source's result of that kind, or None."""
+    if (
+        modifier_stack.find(source) is not None
+        and settings_of(source).moved_by.replace(POSED, "STYLIZE") == kind
+    ):
+        return modifier_stack.find(source)
+    return next((layer for layer in modifier_stack.layers(source) if kind_in(layer) == kind), None)
+
+
+def offset_at(source, index):
+    """(3,) how far the results that are shown move a source's vertex, in local coordinates."""
+    moved = np.zeros(3)
+    for modifier in filter(None, [*modifier_stack.layers(source), modifier_stack.find(source)]):
+        number = "" if modifier_stack.is_field(modifier) else parts(modifier)[1]
+        offsets = motion.carrier(source, modifier).attributes.get(node_group.names_of(number)[0])
+        if modifier.show_viewport and offsets is not None and index < len(offsets.data):
+            moved += inputs.get(modifier, "Factor") * np.array(offsets.data[index].vector)
+    return moved
 
 
 def parts(layer):

@@ -106,7 +106,7 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
         layout.operator(Op.SET_REST, icon="PINNED")
         if 0 <= settings.active_handle < len(settings.handles):
             entry = settings.handles[settings.active_handle]
-            draw_settings(layout, entry, "weight", "reach")
+            draw_settings(layout, entry, "reach")
             if entry.kind in empties.PINS:
                 draw_settings(layout, entry, "hold_turn")
             if entry.kind != "BONE":

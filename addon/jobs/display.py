@@ -6,7 +6,6 @@ import time
 import bpy
 
 from ..blender import timers, user_preferences
-from ..blender.language import translated
 from ..blender.redraw import redraw
 from ..core.runtime.redraw_throttle import RedrawThrottle
 
@@ -17,7 +16,7 @@ class Display:
     """Status bar, sidebar and preview of one job at a time, with throttled redraws."""
 
     def __init__(self):
-        self._timer, self._previews = None, []
+        self._timer, self._previews, self.status = None, [], ""
         self._words, self._seen, self._left = "", None, 0.0
 
     def begin(self, context):
@@ -49,7 +48,7 @@ class Display:
         words = f"{job.message}  {job.fraction:.0%}"
         if words != self._words and self._progress_throttle.is_due(now):
             redraw(context, "UI")
-            context.workspace.status_text_set(f"{words}  {translated('(ESC cancels)')}")
+            context.workspace.status_text_set(self.status or None)  # draws the status bar anew
             self._progress_throttle.begin(now)
             self._words = words
 
@@ -64,13 +63,14 @@ class Display:
         if self._timer is not None:
             timers.stop_events(self._timer)
             for workspace in list(bpy.data.workspaces):
-                workspace.status_text_set(None)
+                workspace.status_text_set(self.status or None)
             redraw(bpy.context, "UI", "WINDOW")
         self._timer = None
 
 
 def show_status(text):
     """Puts a text into the status bar of all windows; "" restores Blender's own."""
+    display.status = text
     for window in bpy.context.window_manager.windows:
         window.workspace.status_text_set(text or None)
 

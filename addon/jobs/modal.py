@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Modal operators that run a job by a timer, between the window's events."""
 
+import bpy
+
 from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.scene_reference import SceneReference
@@ -20,6 +22,21 @@ class Runs(set):
 
 
 runs = Runs()
+
+
+def is_over_view(context, event):
+    """Whether the mouse is over a 3D view, not over its sidebar or header, where Esc ends other things."""
+    spot = event.mouse_x, event.mouse_y
+    for area in context.window.screen.areas if context.window is not None else ():
+        under = [region for region in area.regions if covers(region, spot)]
+        if area.type == "VIEW_3D" and under:
+            return all(region.type == "WINDOW" for region in under)
+    return False
+
+
+def covers(region, spot):
+    """Whether a region contains that pixel of the window."""
+    return 0 <= spot[0] - region.x < region.width and 0 <= spot[1] - region.y < region.height
 
 
 class ModalRun:
@@ -47,8 +64,8 @@ class ModalRun:
         if job is None:  # stopped by a file load, an undo, or the add-on's disabling
             self.leave()
             return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS":
-            job.cancel()
+        if event.type == "ESC" and event.value == "PRESS" and is_over_view(context, event):
+            bpy.ops.arapfields.cancel("INVOKE_DEFAULT")
             return {"RUNNING_MODAL"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}

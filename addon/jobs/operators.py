@@ -2,12 +2,16 @@
 import bpy
 
 from ..blender.guide import Guided
+from ..blender.host import has_window
+from ..blender.language import translated
 from ..core.errors import UserError
 from ..core.runtime import jobs
 
+ASKS_AFTER = 30.0  # seconds of work that a click or a key does not throw away at once
+
 
 class ARAPFIELDS_OT_cancel(Guided, bpy.types.Operator):
-    """Stop the running job; nothing of it is kept"""
+    """Stop the running job; nothing of it is kept, so one that has run for long asks first"""
 
     bl_label = "Cancel"
     guide = "jobs"
@@ -16,8 +20,23 @@ class ARAPFIELDS_OT_cancel(Guided, bpy.types.Operator):
     def obstacle(cls, context):
         return UserError("No job is running") if jobs.running() is None else None
 
+    def invoke(self, context, event):
+        job = jobs.running()
+        if job.elapsed < ASKS_AFTER or not has_window():
+            return self.execute(context)
+        title = translated("Cancel {job} at {done}?", job=translated(job.title), done=f"{job.fraction:.0%}")
+        text = translated("Nothing of it would be kept")
+        return context.window_manager.invoke_confirm(
+            self,
+            event,
+            title=title,
+            message=text,
+            confirm_text=translated("Cancel {job}", job=translated(job.title)),
+        )
+
     def execute(self, context):
-        jobs.running().cancel()
+        if jobs.running() is not None:  # it may have ended while it was asked
+            jobs.running().cancel()
         return {"FINISHED"}
 
 

@@ -5,22 +5,10 @@ from ..blender import modifier_stack
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
 from ..blender.point_data import shape_keys_of
-from ..blender.section import Section, progress_row, wrapped
+from ..blender.section import Section, wrapped
 from ..core.runtime import jobs
 
 ICONS = {"INFO": "CHECKMARK", "WARNING": "ERROR", "ERROR": "CANCEL"}
-
-
-def draw_progress(layout, job):
-    """The running job's progress bar with Cancel, message, elapsed and remaining time."""
-    box = layout.box()
-    progress_row(box.row(align=True), job)
-    wrapped(box, job.message)
-    left = job.remaining
-    text = f"{job.elapsed:.0f} s"
-    if left is not None:
-        text += translated(", about {seconds} s left", seconds=f"{left:.0f}")
-    box.label(text=text, translate=False)
 
 
 def remarks(source):
@@ -38,7 +26,7 @@ def remarks(source):
 
 
 class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
-    """The job that runs, remarks and messages. It is the last panel, so that none moves when it changes."""
+    """Remarks and messages. It is the last panel, so that none moves when it changes."""
 
     bl_label = "Status"
     bl_order = 12
@@ -46,13 +34,10 @@ class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        of_jobs = jobs.running() is not None or bool(jobs.messages())
-        return super().poll(context) and (of_jobs or any(remarks(source_of(context))))
+        return super().poll(context) and bool(jobs.messages() or any(remarks(source_of(context))))
 
     def fill(self, context, source, settings):
         layout = self.layout
-        if jobs.running() is not None:
-            draw_progress(layout, jobs.running())
         for text in remarks(source):
             wrapped(layout, text, icon="INFO")
         for level, text in jobs.messages():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running job in the window's status bar, which is visible without the sidebar."""
+"""The running job's progress, in the window's status bar, which is visible without the sidebar."""
 
 from ..blender.language import translated
 from ..core.runtime import jobs
@@ -7,10 +7,14 @@ from ..names import Op
 
 
 def draw(header, context):
-    """Draws the job's progress and a button that cancels it."""
+    """Draws what the job is at, its progress with the time left, and a button that cancels it."""
     job = jobs.running()
     if job is None:
         return
-    row = header.layout.row(align=True)
-    row.progress(factor=job.fraction, text=f"{translated(job.title)} {job.fraction:.0%}")
+    row, left = header.layout.row(align=True), job.remaining
+    row.label(text=job.message, translate=False)
+    text = f"{translated(job.title)} {job.fraction:.0%}"
+    if left is not None:
+        text += translated(", about {seconds} s left", seconds=f"{left:.0f}")
+    row.progress(factor=job.fraction, text=text)
     row.operator(Op.CANCEL, icon="X")

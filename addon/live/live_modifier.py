@@ -50,6 +50,10 @@ class LiveModifier:
         self.shown = shape
         return True
 
+    def keep_shown(self, source):
+        """Makes the motion on display the earlier one."""
+        self.before, self.moved_by = motion.snapshot(source), settings_of(source).moved_by
+
     def take_away(self, source):
         """Restores the motion from before live mode, if any."""
         if source is not None:

@@ -27,6 +27,9 @@ class LiveSolver:
     def __init__(self, reader):
         self._reader, self.frame_solver = reader, None
         self.solved_request = None  # the request of the last shape
+        # Whether the newest request's shape at rest is on display, as after a cancelled move. It is solved
+        # from rest: the way back from the drag may be long, and end in another shape beside obstacles.
+        self.returns = False
         self.is_playing = False  # whether the newest request is an animation frame, solved by SolvedFrames
         self._stepped_at = None  # when the last step in real time ended; None: the next begins at rest
         self._stepped_motion = None
@@ -63,7 +66,9 @@ class LiveSolver:
             yield self.frame_solver.tracked_shape(request)
             return
         earlier, self.solved_request = self.solved_request, request
-        if earlier is not None and not request.goes_on_from(earlier):
+        if self.returns:
+            self.frame_solver.apply_request(request)  # before reset(): obstacles then start in place
+        if self.returns or (earlier is not None and not request.goes_on_from(earlier)):
             self.frame_solver.solver.reset()
         latest = time.monotonic() + LATEST
         for _ in range(MOST_SHAPES):

@@ -1,23 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..blender import modifier_stack
 from ..blender.language import translated
 from ..blender.object_references import source_of
 from ..blender.property_definitions import choice
-from ..blender.source_operator import ReportingOperator
+from ..blender.source_operator import ReportingOperator, SourceOperator
 from ..core.errors import UserError, refuse
 from ..core.runtime import jobs
-from ..core.settings.choices import LIVE_KINDS
+from ..core.settings.choices import LIVE_KINDS, RESULT_KINDS
+from ..field_modifier import layers
 from ..handles import empties
 from ..handles.movers import frozen
 from ..jobs.job_operator import unready
 from ..results.placement import placement_refusal
+from ..results.removal import take_off
 from ..solver import style_settings
 from . import sessions
 
 
 class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
-    """Let the shape follow handles or style while these change; again to stop, which keeps a shape of pins"""
+    """Have the shape follow its handles, or a style's sliders, while these change"""
 
     bl_label = "Live"
     guide = "deform"
@@ -79,4 +82,36 @@ class ARAPFIELDS_OT_live_keep(ReportingOperator, bpy.types.Operator):
         return translated("{name} kept", name=sessions.end(context, source, keep=True).name)
 
 
-CLASSES = [ARAPFIELDS_OT_live, ARAPFIELDS_OT_live_keep]
+class ARAPFIELDS_OT_remove_result(SourceOperator, bpy.types.Operator):
+    """Give the object its shape from before this result, and end its live mode; handles and settings stay"""
+
+    bl_label = "Remove Result"
+    bl_options = {"REGISTER", "UNDO"}
+    guide = "results"
+
+    kind: choice(RESULT_KINDS, "Kind", "Which result is removed")
+
+    @classmethod
+    def refuses(cls, source):
+        if sessions.is_live(source) or modifier_stack.top(source) is not None:
+            return None
+        return UserError("{name} has no ARAP Fields modifier", source)
+
+    def change(self, context, source):
+        if sessions.is_live(source, self.kind):
+            sessions.live[source.session_uid].keeps_shape = False
+            sessions.end(context, source)
+            if layers.carrying(source, self.kind) is None:
+                return
+        elif sessions.is_live(source):
+            raise UserError("{name} is live; end live mode first", source)
+        if layers.carrying(source, self.kind) is None:
+            raise UserError("{name} has no such result", source)
+        if layers.carrying(source, self.kind) != modifier_stack.top(source):
+            raise UserError("Another result of {name} lies on this one; remove that first", source)
+        reason = take_off(context, source)
+        if reason is not None:
+            self.report({"WARNING"}, translated(reason))
+
+
+CLASSES = [ARAPFIELDS_OT_live, ARAPFIELDS_OT_live_keep, ARAPFIELDS_OT_remove_result]

@@ -15,7 +15,7 @@ from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.runtime.coroutines import run_to_completion, step_for
 from ..core.runtime.latest_request_worker import REST, LatestRequestWorker
-from ..field_modifier import layers, motion, unseen
+from ..field_modifier import layers, unseen
 from ..results import placement, visibility
 from ..solver import secondary_motion, style_settings
 from ..solver.frame_range import animation_range
@@ -196,7 +196,7 @@ class Session:
     def keep_shown(self):
         """With `keeps_shape`, makes the shape on display the one that stays when live mode ends."""
         if self.keeps_shape and self.display.in_place:
-            self.display.before = motion.snapshot(self.source.get())
+            self.display.keep_shown(self.source.get())
             self.carrying.renew()
 
     def set_request(self, request, frame):
@@ -208,6 +208,7 @@ class Session:
                 self.touching = None  # of the shape before; solving this request finds its own
             else:
                 self.is_quiet = self.go_back(request)
+            self.solver.returns = self.is_quiet
             if self.playback.begin(request, frame):
                 self.worker.request(request)
         self.playback.advance(self.requested, frame)

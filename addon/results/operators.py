@@ -6,17 +6,14 @@ from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value, effective_values
 from ..blender.source_operator import SourceOperator
-from ..carried import carried_objects, rest_bones
 from ..core.errors import UserError
 from ..core.runtime.jobs import Item
 from ..core.settings.parameters import EXTRACTION
 from ..field_modifier import layers, motion
-from ..field_nodes import helper
-from ..handles.following import Followers
 from ..jobs.job_operator import JobOperator
 from ..properties.choices import extraction, surface
 from ..surface.source_surface import read_surface
-from . import placement, result_objects, visibility
+from . import placement, removal, result_objects, visibility
 
 
 class FieldOperator(SourceOperator):
@@ -63,19 +60,9 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
     bl_label = "Remove"
 
     def change(self, context, source):
-        layers.uncover(source, baked=True)
-        followers = Followers(context, source) if settings_of(source).moved_by == "WRAP" else None
-        try:
-            if not modifier_stack.layers(source):
-                rest_bones.reset(context, source)
-        except UserError as error:
-            self.report({"WARNING"}, translated(error))
-        motion.remove(source)
-        layers.uncover(source)
-        carried_objects.give_back_all(source)
-        helper.clear(source)
-        if followers is not None:
-            followers.follow(context, source, back=True)
+        reason = removal.take_off(context, source)
+        if reason is not None:
+            self.report({"WARNING"}, translated(reason))
 
 
 class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):

@@ -15,6 +15,7 @@ class ARAPFIELDS_PT_result(Advanced, bpy.types.Panel):
         layout = self.layout
         draw_settings(layout, settings, "output", "result", "resolution", "refine_thin", "normals")
         layout.operator(Op.EXTRACT, icon="OUTLINER_OB_SURFACE")
+        layout.operator(Op.FIELD_NODES, icon="GEOMETRY_NODES")
         modifier = modifier_stack.top(source)
         if modifier is not None:
             modifier_row(layout, modifier, "GEOMETRY_NODES", Op.REMOVE_FIELD)

@@ -71,6 +71,15 @@ def give_back(source):
             settings.live_hidden = ""
 
 
+def show_landmarks(source, shown):
+    """Shows or hides the landmarks of a source's wrap in viewports; those elsewhere stay as they are."""
+    for entry in settings_of(source).wrap.landmarks:
+        for item in (entry.rest, entry.on_target):
+            if item is not None:
+                with contextlib.suppress(RuntimeError):  # in a collection that the view layer leaves out
+                    item.hide_set(not shown)
+
+
 def forget(source):
     """Makes visibility set `for_now` permanent."""
     for item in family(source):

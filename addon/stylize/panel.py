@@ -14,7 +14,7 @@ from ..blender.section import (
     settings_column,
 )
 from ..core.settings.styles import CUSTOM, STYLIZE
-from ..live.panel import live_buttons, playback_progress
+from ..live.panel import live_buttons, playback_progress, result_row
 from ..names import Op
 from ..properties.choices import STYLE_ITEMS
 from ..results.placement import placement_refusal, replaced_by
@@ -63,8 +63,9 @@ class ARAPFIELDS_PT_stylize(Section, bpy.types.Panel):
             draw_settings(layout, style, "style_object")
         settings_column(layout, style, STYLIZE, advanced=False)
         reason = style_settings.refusal(source)
-        live_buttons(layout, source, "STYLIZE", reason)
+        live_buttons(layout, source, reason)
         job_button(layout, Op.STYLIZE, "MOD_EDGESPLIT")
+        result_row(layout, source, "STYLIZE")
         playback_progress(layout, source, "STYLIZE")
         note(layout, reason, placement_refusal(source), replaced_by(source, "STYLIZE"))
 

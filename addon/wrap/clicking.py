@@ -9,6 +9,7 @@ from ..blender.language import translated
 from ..blender.object_references import ObjectReference, settings_of, source_of
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
+from ..results import visibility
 from . import landmarks
 
 AROUND = np.arange(0, 2 * np.pi, np.pi / 4)
@@ -38,6 +39,7 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
     bl_label = "Click Landmarks"
     bl_options = {"UNDO"}
     guide = "wrap"
+    missed = False  # whether the last click met neither object
 
     @classmethod
     def refuses(cls, source):
@@ -52,6 +54,7 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
         source = source_of(context)
         self.ends = [ObjectReference(source), ObjectReference(landmarks.target_of(source))]
         self.clicked = {}
+        visibility.show_landmarks(source, True)
         self.tell(context)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -80,8 +83,12 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
         if not covers(whole, spot) or any(covers(r, spot) for r in context.area.regions if r != whole):
             return False
         which, place = self.struck(context, whole, np.subtract(spot, (whole.x, whole.y)))
-        if which is None:
-            return not is_navigation(context, whole, spot)
+        if which is None and is_navigation(context, whole, spot):
+            return False
+        self.missed = which is None
+        if self.missed:
+            self.report({"WARNING"}, self.miss())
+            return True
         self.clicked[which] = np.array(place)
         if len(self.clicked) == 2:
             landmarks.place(context, *(end.get() for end in self.ends), self.clicked[0], self.clicked[1])
@@ -104,12 +111,16 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
 
     def take_back(self):
         """Removes the clicked half of a pair, else the last pair."""
-        source = self.ends[0].get()
+        source, self.missed = self.ends[0].get(), False
         count = len(settings_of(source).wrap.landmarks)
         if self.clicked:
             self.clicked = {}
         elif count:
             landmarks.remove(source, count - 1)
+
+    def miss(self):
+        names = [end.name for end in self.ends]
+        return translated("Neither {source} nor {target} lies there", source=names[0], target=names[1])
 
     def tell(self, context):
         names = [end.name for end in self.ends]
@@ -119,6 +130,8 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
             missing = names[1] if 0 in self.clicked else names[0]
             text = translated("Click the same place on {name}", name=missing)
         keys = translated("Backspace takes back, Enter ends")
+        if self.missed:
+            text = f"{self.miss()}. {text}"
         context.area.header_text_set(f"{text}. {keys}")
         context.area.tag_redraw()
 

@@ -25,7 +25,10 @@ def draw():
     gpu.state.blend_set("ALPHA")
     for number, entry in enumerate(settings_of(source).wrap.landmarks, 1):
         for item in (entry.rest, entry.on_target) if entry in used else ():
-            spot = screen.project(perspective, size, item.matrix_world.translation)[0]
+            place = item.matrix_world.translation
+            if item == entry.rest:
+                place = landmarks.shown_place(source, place)
+            spot = screen.project(perspective, size, place)[0]
             if item.visible_get() and np.isfinite(spot).all():
                 disc(context, spot, tuple(entry.colour), str(number))
     gpu.state.blend_set("NONE")

@@ -7,14 +7,17 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..blender import mesh_arrays
+from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import facing, inverse, transform
+from ..field_modifier import layers
 from ..handles.empties import delete, make_empty, matrix_of
 from ..handles.palette import free_colour
 from ..pin_tool import places
+from ..results import visibility
 
+MOST_KNOWN = 1000  # places whose nearest vertices are remembered
 SIZE = 0.02  # of an Empty, as a share of the object's diagonal
 
 
@@ -84,6 +87,7 @@ def place(context, source, target, rest, on_target):
 
 def add(context, source, target, pair):
     """Adds a pair at these world locations: on the source at rest, on the target."""
+    visibility.show_landmarks(source, True)
     number = len(settings_of(source).wrap.landmarks) + 1
     ends = [
         empty_at(context, source, pair[0], f"Landmark {number}"),
@@ -105,6 +109,38 @@ def empty_at(context, owner, where, name):
     empty = make_empty(context, owner, Matrix.Translation(where.tolist()), size, name)
     empty.empty_display_type, empty.show_in_front = "SPHERE", True
     return empty
+
+
+def shown_place(source, place):
+    """(3,) where the shown surface of a source has a place of its surface at rest, both in the world."""
+    place, world = np.array(place, dtype=np.float64), matrix_of(source)
+    if modifier_stack.top(source) is None or source.mode == "EDIT":
+        return place
+    local = transform(inverse(world), place[None])[0]
+    return place + world[:3, :3] @ layers.offset_at(source, nearest.vertex(source, local))
+
+
+class Nearest:
+    """The vertices that were looked for last, since views are drawn again and again."""
+
+    def __init__(self):
+        self.known = {}  # {(session_uid of the object, number of vertices, place): index}
+
+    def vertex(self, source, local):
+        """The index of a mesh's vertex nearest to a place, in local coordinates."""
+        key = source.session_uid, len(source.data.vertices), tuple(local.round(6).tolist())
+        if key not in self.known:
+            if len(self.known) > MOST_KNOWN:
+                self.known.clear()
+            away = ((mesh_arrays.positions(source.data) - local) ** 2).sum(axis=1)
+            self.known[key] = int(away.argmin())
+        return self.known[key]
+
+    def clear(self):
+        self.known.clear()
+
+
+nearest = Nearest()
 
 
 def mirror(context, source):

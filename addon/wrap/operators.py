@@ -25,6 +25,7 @@ from ..handles import empties
 from ..handles.following import Followers
 from ..jobs.job_operator import JobOperator
 from ..properties.choices import result_properties
+from ..results import visibility
 from ..results.placement import holds_place
 from . import keys, landmarks, transfer
 from .matching import Match, Wrapped
@@ -106,6 +107,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         def apply(solved):
             said, context, source = item.apply(solved), bpy.context, marks.source.get()
             marks.put()
+            visibility.show_landmarks(source, False)
             if self.in_place(source):
                 wrapped.put()
             for one in below:

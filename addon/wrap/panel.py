@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender import modifier_stack
 from ..blender.object_references import in_scene
 from ..blender.section import Advanced, Section, draw_settings, job_button, note, presets, settings_column
 from ..carried import rest_bones
 from ..core.settings.parameters import WRAP
-from ..field_modifier import inputs
+from ..live.panel import result_row
 from ..names import Op
 from ..results.placement import holds_place, placement_refusal, replaced_by
 from . import landmarks
@@ -53,7 +52,7 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
         if not holds_place(source, wrap.onto):
             draw_settings(layout, wrap, "move_object")
         job_button(layout, Op.WRAP, "MOD_SHRINKWRAP")
-        factor_slider(layout, source)
+        result_row(layout, source, "WRAP")
         draw_settings(layout, wrap, "transfer")
         if "GROUPS" in wrap.transfer:
             draw_settings(layout, wrap, "groups", "mix")
@@ -61,22 +60,7 @@ class ARAPFIELDS_PT_wrap(Section, bpy.types.Panel):
         layout.operator(Op.REFIT, icon="MOD_CLOTH")
         if rest_bones.fitted(source):
             layout.operator(Op.RESET_BONES, icon="BONE_DATA")
-        job_button(layout, Op.WRAP_SHEET, "IMAGE_DATA")
-        draw_settings(layout, wrap, "frames")
-        job_button(layout, Op.WRAP_SEQUENCE, "REC")
         note(layout, landmarks.refusal(source), placement_refusal(source), replaced_by(source, "WRAP"))
-
-
-def factor_slider(layout, source):
-    """Draws the modifier's Factor: 0 is the rest shape, 1 the result."""
-    modifier = next(iter(modifier_stack.layers(source)), modifier_stack.find(source))
-    if modifier is None:
-        return
-    socket = inputs.slot(modifier, "Factor")
-    if socket is not None:
-        layout.prop(socket, "value", text="Factor", slider=True)
-    else:
-        layout.prop(modifier, f'["{inputs.identifier(modifier, "Factor")}"]', text="Factor", slider=True)
 
 
 class ARAPFIELDS_PT_wrap_settings(Advanced, bpy.types.Panel):
@@ -85,7 +69,11 @@ class ARAPFIELDS_PT_wrap_settings(Advanced, bpy.types.Panel):
     tasks = frozenset({"WRAP"})
 
     def fill(self, context, source, settings):
-        settings_column(self.layout, settings.wrap, WRAP, advanced=True)
+        layout = self.layout
+        job_button(layout, Op.WRAP_SHEET, "IMAGE_DATA")
+        draw_settings(layout, settings.wrap, "frames")
+        job_button(layout, Op.WRAP_SEQUENCE, "REC")
+        settings_column(layout, settings.wrap, WRAP, advanced=True)
 
 
 CLASSES = [ARAPFIELDS_UL_landmarks, ARAPFIELDS_PT_wrap, ARAPFIELDS_PT_wrap_settings]

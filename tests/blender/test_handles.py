@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Handles: made, named, chosen, and whose they are."""
 
+import tempfile
+
 import numpy as np
 import pytest
 from support.blender import inside
@@ -12,6 +14,7 @@ if IN_BLENDER:
     from support.blender.baking import animated
     from support.blender.bones import rigged_bar
     from support.blender.live import step
+    from support.blender.panels import drawn
     from support.blender.pins import pin
 
     from addon.blender.object_references import owner_of, source_of
@@ -355,6 +358,7 @@ if inside.IN_BLENDER:
     from support.blender import scenes
     from support.blender.baking import at, cache_file
     from support.blender.live import step
+    from support.blender.panels import drawn
     from support.blender.pins import pin
 
     from addon.core.geometry.spaces import space_of
@@ -586,6 +590,48 @@ def test_handles_of_a_linked_object_come_along():
     assert entry.empty.name == names[1] and entry.empty.parent == bar and not entry.in_world
     handles = empties.solve_handles(bar, space_of(bar.matrix_world))
     assert len(handles) >= 1 and not handles[0].is_anchor
+
+
+def test_a_library_override_keeps_its_pose_and_takes_its_handles_along():
+    """Of a character with handles in a library: it can be placed, and once it is local also posed."""
+    bar, _, moving = scenes.bar_with_handles()
+    home = bpy.data.collections.new("Character")
+    bpy.context.scene.collection.children.link(home)
+    for item in (bar, *(entry.empty for entry in bar.arapfields.handles)):
+        home.objects.link(item)
+    moving.location.z += 0.4
+    bpy.context.view_layer.update()
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    posed, count = scenes.world_points(bar), len(bar.arapfields.handles)
+    path = tempfile.mktemp(suffix=".blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, into):
+        into.collections = ["Character"]
+    context = bpy.context
+    into.collections[0].override_hierarchy_create(context.scene, context.view_layer, do_fully_editable=True)
+    item = next(one for one in bpy.data.objects if one.override_library and one.type == "MESH")
+    context.view_layer.update()
+    assert np.array_equal(scenes.world_points(item), posed)
+    empties = [entry.empty for entry in item.arapfields.handles]
+    assert len(empties) == count and all(one.override_library and one.parent == item for one in empties)
+    before = [one.matrix_world.translation.copy() for one in empties]
+    item.location.x += 2.0
+    context.view_layer.update()
+    away = [(one.matrix_world.translation - was).x for one, was in zip(empties, before, strict=True)]
+    assert np.allclose(away, 2.0, atol=1e-5)
+    assert np.allclose(scenes.world_points(item) - posed, (2, 0, 0), atol=1e-5)
+    scenes.activate(item)
+    drawn()  # nothing is in the way of the panel
+    with pytest.raises(RuntimeError, match="is a library override; make it local first"):
+        bpy.ops.arapfields.deform(**scenes.QUICK)
+    bpy.ops.object.select_all(action="SELECT")
+    bpy.ops.object.make_local(type="ALL")
+    context.view_layer.update()
+    (item,) = (one for one in context.scene.objects if one.type == "MESH")
+    scenes.activate(item)
+    assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}
+    assert np.allclose(scenes.world_points(item) - posed, (2, 0, 0), atol=1e-3)
 
 
 # Handles that Blender does not evaluate: disabled in viewports, or left out of the view layer.

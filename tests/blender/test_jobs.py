@@ -2,9 +2,11 @@
 """Jobs: the modal operator, and users who edit, delete or leave what a job works on."""
 
 import contextlib
+import functools
 import inspect
 import tempfile
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ if IN_BLENDER:
     from support.blender import scenes, stages
     from support.blender.baking import animated, saved_animation, stepped
     from support.blender.bones import rigged_bar
+    from support.blender.panels import Layout
     from support.blender.scenes import delete
     from support.blender.stages import Operator
     from support.blender.wraps import SMALL, bar_and_target
@@ -31,7 +34,8 @@ if IN_BLENDER:
     from addon.deform.operators import ARAPFIELDS_OT_deform
     from addon.field_modifier import inputs
     from addon.handles import empties, operators
-    from addon.jobs import display, modal
+    from addon.jobs import display, modal, status_bar
+    from addon.jobs import operators as job_operators
     from addon.jobs.modal import ModalRun
     from addon.results import placement
     from addon.wrap.operators import ARAPFIELDS_OT_wrap
@@ -47,7 +51,11 @@ class Window:
     def __init__(self, app):
         self.app = app
         self.timers, self.texts, self.handlers = [], [], []
-        self.window, self.window_manager, self.workspace = object(), self, self
+        regions = [SimpleNamespace(type="WINDOW", x=0, y=0, width=1000, height=900)]
+        regions.append(SimpleNamespace(type="UI", x=800, y=0, width=200, height=900))
+        areas = [SimpleNamespace(type="VIEW_3D", regions=regions)]
+        self.window = SimpleNamespace(screen=SimpleNamespace(areas=areas))
+        self.window_manager = self.workspace = self
         self.windows, self.data, self.context = [], self, self
         self.workspaces = [self]
         self.scene, self.view_layer = timers.bpy.context.scene, timers.bpy.context.view_layer
@@ -63,13 +71,16 @@ class Window:
         self.handlers.append(operator)
 
     def status_text_set(self, text):
-        self.texts.append(text)
+        said = []
+        status_bar.draw(SimpleNamespace(layout=Layout(said)), self)
+        self.texts.append(" ".join([*said, *([text] if text else [])]))
 
 
 @contextlib.contextmanager
 def window():
     """A Window that the add-on takes for Blender's own."""
-    stand_in, kept = Window(timers.bpy.app), (display.bpy, timers.bpy, modal.has_window)
+    kept = display.bpy, timers.bpy, modal.has_window
+    stand_in = Window(timers.bpy.app)
     display.bpy, timers.bpy, modal.has_window = stand_in, stand_in, lambda: True
     try:
         yield stand_in
@@ -92,8 +103,8 @@ def operator(work):
     return Operator()
 
 
-def event(kind, value="NOTHING"):
-    return type("Event", (), {"type": kind, "value": value})
+def event(kind, value="NOTHING", x=400, y=400):
+    return SimpleNamespace(type=kind, value=value, mouse_x=x, mouse_y=y)
 
 
 def until_ended(running, context):
@@ -120,26 +131,52 @@ def test_a_job_runs_beside_events_and_leaves_nothing_in_the_window():
         assert context.handlers == [running] and len(context.timers) == 1
         assert running.modal(context, event("MOUSEMOVE")) == {"PASS_THROUGH"}
         assert until_ended(running, context) == {"FINISHED"}
-        assert "Bar · Working" in " ".join(filter(None, context.texts))
-        assert context.texts[-1] is None and not context.timers
+        assert "Bar · Working" in " ".join(context.texts)
+        assert context.texts[-1] == "" and not context.timers
 
 
-def test_escape_cancels():
+def test_escape_cancels_over_a_view():
     with window() as context:
         running = operator(wait_for_cancel)
         running.invoke(context, None)
+        for x, y in ((900, 400), (400, 950)):  # the sidebar, another area
+            assert running.modal(context, event("ESC", "PRESS", x, y)) == {"PASS_THROUGH"}
+        assert not jobs.running().cancelled
         assert running.modal(context, event("ESC", "PRESS")) == {"RUNNING_MODAL"}
         assert until_ended(running, context) == {"CANCELLED"}
-        assert context.texts[-1] is None and not context.timers
+        assert context.texts[-1] == "" and not context.timers
+
+
+def test_a_job_of_long_standing_asks_before_it_is_thrown_away():
+    asked = []
+
+    class Confirm:
+        def invoke_confirm(self, operator, event, **texts):
+            asked.append(texts["title"])
+            return {"RUNNING_MODAL"}
+
+    job_operators.has_window, kept = lambda: True, job_operators.has_window
+    cancel = SimpleNamespace(execute=lambda context: {"FINISHED"})
+    job = jobs.Job("Bake", [jobs.Item("Bar", wait_for_cancel)], native.library().Task)
+    jobs.begin(job)
+    try:
+        invoke = functools.partial(vars(job_operators.ARAPFIELDS_OT_cancel)["invoke"], cancel)
+        context = SimpleNamespace(window_manager=Confirm())
+        assert invoke(context, None) == {"FINISHED"} and not asked
+        job._begin -= job_operators.ASKS_AFTER
+        assert invoke(context, None) == {"RUNNING_MODAL"} and asked == ["Cancel Bake at 0%?"]
+    finally:
+        job_operators.has_window = kept
+        jobs.stop()
 
 
 def test_the_status_bar_is_cleared_when_the_extension_is_disabled():
     with window() as context:
         running = operator(wait_for_cancel)
         running.invoke(context, None)
-        assert context.texts[-1] and "Bar" in context.texts[-1]
+        assert "Bar" in context.texts[-1]
         addon.unregister()
-        assert context.texts[-1] is None and not context.timers and jobs.running() is None
+        assert context.texts[-1] == "" and not context.timers and jobs.running() is None
         assert inspect.getgeneratorstate(running._coroutine) == inspect.GEN_CLOSED  # not without its operator
         assert running.modal(context, event("TIMER")) == {"CANCELLED"}
         addon.register()

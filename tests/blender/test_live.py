@@ -28,6 +28,7 @@ if IN_BLENDER:
     from addon.core.runtime.coroutines import run_to_completion
     from addon.field_modifier import inputs, motion
     from addon.live import recovery, sessions
+    from addon.live.live_solver import LiveSolver
     from addon.pin_tool import drag
     from addon.results.placement import placement_refusal
 
@@ -784,3 +785,37 @@ def test_played_frames_are_those_of_a_bake_where_an_armature_before_is_animated(
     for frame in (1, 4, 6):
         assert np.abs(shapes["KEYS", frame] - shapes["PC2", frame]).max() < KEYS_OFF, frame
     assert np.abs(shapes["PC2", 6] - shapes["PC2", 1]).max() > 0.5
+
+
+def test_a_cancelled_move_leaves_no_trace_in_the_solver():
+    """What comes back to a pose whose shape is known is solved as if it had never left."""
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.ops.mesh.primitive_cube_add(size=0.3, location=(0, 0, 0.9))
+    scenes.activate(bar)
+    bpy.context.object.select_set(True)
+    bpy.data.objects["Cube"].select_set(True)
+    bpy.ops.arapfields.add_obstacle()
+    moving.location.z += 0.3
+    bpy.context.view_layer.update()
+    bpy.ops.arapfields.live()
+    step(refined=True)
+    session = sessions.live[bar.session_uid]
+    asked = []
+    session.worker.request, given = asked.append, session.worker.request
+    cube = bpy.data.objects["Cube"]
+    for x, z in ((0.3, 0.0), (0.0, 0.9)):  # through the bar, and back
+        cube.location = (x, 0, z)
+        bpy.context.view_layer.update()
+        session.update(bpy.context)
+        assert session.solver.returns == (z == 0.9)
+    session.worker.request = given
+    session.worker.stop()
+    solver = session.solver
+    solver.returns = False
+    away = [*solver.solve(asked[0])][-1].points
+    solver.returns = True
+    back = [*solver.solve(asked[1])][-1].points
+    fresh = LiveSolver(session.reader)
+    fresh.prepare()
+    other = [*fresh.solve(asked[1])][-1].points
+    assert np.abs(away - back).max() > 0.01 and (back == other).all()

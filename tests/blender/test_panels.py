@@ -26,6 +26,7 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.handles import empties
     from addon.jobs import status_bar
+    from addon.live import sessions
     from addon.names import Op
 
 pytestmark = pytest.mark.in_blender
@@ -63,8 +64,8 @@ EXPECTED = {
     "fitted": ("ARAPFIELDS_PT_surface", "Fit in the cache"),
     "fit cleared": ("ARAPFIELDS_PT_surface", "Fit was cleared"),
     "custom style": ("ARAPFIELDS_PT_stylize", "Normals Of"),
-    "live": ("ARAPFIELDS_PT_deform", "Keep Shape"),
-    "running": ("ARAPFIELDS_PT_status", "Deform 0%"),
+    "live": ("ARAPFIELDS_PT_deform", "Finish Pose"),
+    "running": ("ARAPFIELDS_PT_deform", "Cancel Deform"),
     "a failure": ("ARAPFIELDS_PT_status", "Bar: the mesh has no faces"),
     "library missing": ("ARAPFIELDS_PT_source", "The native library is not part of this"),
 }
@@ -85,7 +86,7 @@ def test_the_panel_draws(state):
         said = "ARAPFIELDS_PT_status" in shown
         hinders = "ARAPFIELDS_PT_source" in shown
         assert len(shown) == 18 + said + hinders and hinders == (state == "edit mode")
-        assert said == (state in ("modifiers and keys", "fitted", "fit cleared", "running", "a failure"))
+        assert said == (state in ("modifiers and keys", "fitted", "fit cleared", "a failure"))
     if state in EXPECTED:
         section, text = EXPECTED[state]
         assert text in " ".join(texts_of[section]), texts_of[section]  # long texts take several labels
@@ -281,7 +282,7 @@ def test_the_status_bar_shows_the_job_and_its_cancel():
     assert texts() == []
     undo = prepared("running")
     try:
-        assert texts() == ["Deform 0%", "Cancel"]
+        assert texts() == ["Bar", "Deform 0%", "Cancel"]
     finally:
         undo()
     assert texts() == []
@@ -300,6 +301,72 @@ def test_the_fold_barrier_acts_on_every_field(field):
     assert abs(shapes[1] - shapes[0]).max() > 1e-3
 
 
+def test_one_button_poses_and_one_undoes_it():
+    bar, _, moving = scenes.bar_with_handles()
+    rest = scenes.world_points(bar)
+    assert {"Pose"} <= {*drawn()["ARAPFIELDS_PT_deform"]} and "Factor" not in drawn()["ARAPFIELDS_PT_deform"]
+    moving.location.z += 0.5
+    bpy.context.view_layer.update()
+    for way in ("live", "finished"):
+        assert bpy.ops.arapfields.live() == {"FINISHED"}
+        texts = {*drawn()["ARAPFIELDS_PT_deform"]}
+        assert "Finish Pose" in texts and not texts & {"Pose", "Keep Shape", "Live Deform", "Deform"}
+        if way == "finished":
+            assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}
+            assert not sessions.is_live(bar) and "Pose" in drawn()["ARAPFIELDS_PT_deform"]
+            assert "Factor" in drawn()["ARAPFIELDS_PT_deform"]
+        assert abs(scenes.world_points(bar) - rest).max() > 0.3
+        assert bpy.ops.arapfields.remove_result(kind="DEFORM") == {"FINISHED"}
+        assert not bar.modifiers and not sessions.is_live(bar)
+        assert (scenes.world_points(bar) == rest).all()
+    assert not bpy.ops.arapfields.remove_result.poll()
+
+
+def test_a_pose_by_pins_goes_with_one_press():
+    """What a drag keeps is removed too, and what it lies on stays."""
+    bar, _, moving = scenes.bar_with_handles()
+    rest = scenes.world_points(bar)
+    sessions.begin(bpy.context, bar, keeps_shape=True)
+    moving.location.z += 0.5
+    bpy.context.view_layer.update()
+    sessions.settle(bpy.context, bar.session_uid)
+    assert abs(scenes.world_points(bar) - rest).max() > 0.3
+    assert bpy.ops.arapfields.remove_result(kind="DEFORM") == {"FINISHED"}
+    assert not bar.modifiers and (scenes.world_points(bar) == rest).all()
+
+
+def test_each_result_is_removed_where_it_is_made():
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.ops.arapfields.stylize(style="CUBE", **scenes.QUICK)
+    styled = scenes.world_points(bar)
+    moving.location.z += 0.5
+    bpy.context.view_layer.update()
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    shown = drawn()
+    for section in ("deform", "stylize"):
+        assert "Factor" in shown[f"ARAPFIELDS_PT_{section}"], section
+    assert "Factor" not in shown["ARAPFIELDS_PT_wrap"]
+    with pytest.raises(RuntimeError, match="Another result of Bar lies on this one"):
+        bpy.ops.arapfields.remove_result(kind="STYLIZE")
+    with pytest.raises(RuntimeError, match="Bar has no such result"):
+        bpy.ops.arapfields.remove_result(kind="WRAP")
+    bpy.ops.arapfields.remove_result(kind="DEFORM")
+    assert (scenes.world_points(bar) == styled).all() and len(bar.modifiers) == 1
+    bpy.ops.arapfields.remove_result(kind="STYLIZE")
+    assert not bar.modifiers
+
+
+def test_what_is_seldom_used_is_under_advanced():
+    scenes.bar_with_handles()
+    shown = drawn()
+    seldom = {"Contact Sheet", "Wrap Sequence", "Field as Nodes", "Exact Handles", "Weight"}
+    everyday = [
+        name for name in shown if "_PT_" in name and not hasattr(getattr(bpy.types, name), "bl_parent_id")
+    ]
+    assert not seldom & {text for name in everyday for text in shown[name]}
+    assert seldom <= {text for texts in shown.values() for text in texts}
+
+
 # Where users look for things: Blender's menus, tooltips, manual pages, a word at the first start.
 
 OPERATORS = (
@@ -313,6 +380,7 @@ OPERATORS = (
     "STYLIZE",
     "SKIN",
     "LIVE_KEEP",
+    "REMOVE_RESULT",
     "BAKE",
     "FIT",
 )

@@ -31,6 +31,7 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.field_modifier import inputs
     from addon.handles.empties import matrix_of
+    from addon.results import visibility
     from addon.wrap import landmarks
     from addon.wrap.clicking import ARAPFIELDS_OT_click_landmarks as Operator
     from arapfields.cli import contact_sheet
@@ -518,13 +519,11 @@ def clicker():
     item = scenes.bar()
     item.arapfields.wrap.onto = target
     bpy.context.view_layer.update()
-    names = ("modal", "click", "struck", "take_back", "tell", "end")
+    names = ("modal", "click", "struck", "take_back", "miss", "tell", "end")
     operator = type("Clicker", (), {name: vars(Operator)[name] for name in names})()
-    operator.ends, operator.clicked, operator.report = (
-        [ObjectReference(item), ObjectReference(target)],
-        {},
-        print,
-    )
+    said = []
+    operator.ends, operator.clicked = [ObjectReference(item), ObjectReference(target)], {}
+    operator.report = lambda *given: said.append(given)
     turn = Matrix(((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, -10), (0, 0, 0, 1)))
     flat = Matrix.Diagonal((0.2, 0.2, -0.01, 1)) @ turn
     view = SimpleNamespace(
@@ -536,7 +535,7 @@ def clicker():
     area = SimpleNamespace(
         regions=[whole, sidebar],
         spaces=SimpleNamespace(active=space),
-        header_text_set=print,
+        header_text_set=lambda *given: said.append(given),
         tag_redraw=print,
     )
     context = SimpleNamespace(
@@ -552,6 +551,7 @@ def clicker():
         event = SimpleNamespace(type="LEFTMOUSE", value="PRESS", mouse_x=500 + 100 * x, mouse_y=500 + 100 * z)
         return operator.modal(context, event), sorted(operator.clicked)
 
+    click.said = said
     return item, click
 
 
@@ -569,6 +569,52 @@ def test_a_click_on_neither_selects_nothing_and_the_sidebar_has_its_own():
     assert click(1.5, 0.0) == ({"RUNNING_MODAL"}, [])  # between the two
     assert click(3.8, 0.0) == ({"PASS_THROUGH"}, [])  # the sidebar lies over the target
     assert click(3.0, 4.0) == ({"PASS_THROUGH"}, [])  # the gizmos of navigation
+
+
+def test_a_click_that_misses_gives_a_sign():
+    _, click = clicker()
+    said = click.said
+    click(1.5, 0.0)
+    assert said.pop(0) == ({"WARNING"}, "Neither Bar nor Scan lies there")
+    assert said.pop(0)[0].startswith("Neither Bar nor Scan lies there. Click a place on Bar")
+    click(0.0, 0.0)
+    assert said == [("Click the same place on Scan. Backspace takes back, Enter ends",)]
+
+
+def test_landmarks_lie_on_the_shape_that_is_shown():
+    item, click = clicker()
+    for x in (-0.9, 0.9):
+        scenes.activate(scenes.cube_empty((x, 0, 0), (0.15, 0.4, 0.4)), item)
+        bpy.context.view_layer.update()
+        bpy.ops.arapfields.add_handle()
+    item.arapfields.handles[1].empty.location.z += 0.5
+    bpy.context.view_layer.update()
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    click(0.9, 0.5)
+    click(3.0, 0.0)
+    (pair,) = item.arapfields.wrap.landmarks
+    rest = np.array(pair.rest.matrix_world.translation)
+    shown = landmarks.shown_place(item, rest)
+    assert abs(rest[2]) < 0.15 and np.linalg.norm(shown - (0.9, -0.25, 0.5)) < 0.1
+    modifier_stack.find(item).show_viewport = False
+    assert (landmarks.shown_place(item, rest) == rest).all()
+
+
+def test_landmarks_go_when_it_is_wrapped_and_come_again():
+    item, _ = clicker()
+    item.arapfields.wrap.samples, item.arapfields.wrap.stages = 1000, 1
+    bpy.ops.arapfields.add_landmark(rest=(-1, 0, 0), on_target=(2, 0, 0))
+    (pair,) = item.arapfields.wrap.landmarks
+    ends = pair.rest, pair.on_target
+    for again in (
+        lambda: visibility.show_landmarks(item, True),
+        lambda: bpy.ops.arapfields.remove_result(kind="WRAP"),
+    ):
+        assert all(end.visible_get() for end in ends)
+        bpy.ops.arapfields.wrap()
+        assert not any(end.visible_get() for end in ends)
+        again()
+    assert all(end.visible_get() for end in ends)
 
 
 def test_landmarks_are_mirrored_once():

@@ -5,7 +5,7 @@ import threading
 
 from .threads import start_thread
 
-REST = 0.4  # seconds without a new request after which the result is refined
+REST = 0.25  # seconds without a new request after which the result is refined
 
 
 class CancellationToken:

@@ -122,6 +122,12 @@ LIVE_KINDS = (
     ("STYLIZE", "Stylize", "The shape follows the style's settings, and its handles where the style does"),
 )
 
+RESULT_KINDS = (
+    ("DEFORM", "Pose", "What the handles have made"),
+    ("STYLIZE", "Style", "What the style has made"),
+    ("WRAP", "Wrap", "What the wrap has made"),
+)
+
 # Kinds of data transferred from a wrapped object to its target.
 TRANSFERRED = (
     ("KEYS", "Shape Keys", "Each key of the object, turned and scaled as the wrap does, with its drivers"),
