@@ -182,7 +182,8 @@ class FrameSolver:
         field = styled.field(setup.surface, self.sampled.samples, task, self.distances)
         moved = field(self.rest, triangles=self.rest_triangles)
         triangles = self.rest_triangles if topology is None else topology.corners
-        return self._shape(request, styled.finished(setup.surface, self.rest, triangles, moved, task), field)
+        finished = styled.finished(setup.surface, self.rest, triangles, moved, task, self.distances)
+        return self._shape(request, finished, field)
 
     def tracked_shape(self, request):
         """The request's shape as the solver tracks it, in single precision."""

@@ -38,8 +38,9 @@ class Stylization:
             task=task,
         )
 
-    def finished(self, surface, points, triangles, moved, task):
-        """(k, 3) positions of `moved` points, of which `points` (k, 3) are those at rest, in solve space."""
+    def finished(self, surface, points, triangles, moved, task, distances=None):
+        """(k, 3) positions of `moved` points, of which `points` (k, 3) are those at rest, in solve space;
+        `distances` as of field()."""
         if self.finish is None or triangles is None:
             return moved
         weights = self.region
@@ -48,14 +49,16 @@ class Stylization:
         if self.handles:
             held = held_points(self.handles, surface, points)
             weights = np.where(held, 0.0, 1.0 if weights is None else weights)
-        further = {"weights": weights, "up": None if self.handles else self.up, "task": task}
+        up = None if self.handles else self.up
+        contact = native_contact(self.contact, distances)
+        further = {"weights": weights, "up": up, "contact": contact, "task": task}
         return native.library().sharpen(points, triangles, moved, self.directions, self.finish, **further)
 
 
 def stylization(values, directions, up, handles, region, contact, machine=None):
     """The Stylization of settings by name; `machine` as of options_of()."""
     finish = None
-    if values["finish"] and contact is None:
+    if values["finish"] and not (contact is not None and contact.itself):
         shared = {name: values[name] for name in ("strength", "sharpness", "rigidity")}
         finish = options_of("sharpen", shared, machine)
         values = values | {"centers": native.library().CENTERS_BEFORE_SHARPEN}

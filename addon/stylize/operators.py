@@ -54,11 +54,13 @@ class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):
         contact = for_job(context, source, is_fast(values, STYLIZE), space)
         styled = stylization(values, style.directions(af), style.up, handles, weights, contact)
 
+        distances = {}  # to obstacles, of the field for the finish
+
         def solve(tracker, rest, samples, weight):
-            return styled.field(rest, samples, tracker.start("Stylizing", weight))
+            return styled.field(rest, samples, tracker.start("Stylizing", weight), distances)
 
         def finish(tracker, *of_mesh):
-            return styled.finished(*of_mesh, tracker.start("Finishing", 1.0))
+            return styled.finished(*of_mesh, tracker.start("Finishing", 1.0), distances)
 
         counted = values["samples"], values["seed"]
         further = {} if styled.finish is None else {"finish": finish}

@@ -22,7 +22,7 @@ constexpr double same = 1e-4;
 
 /// How far a surface moves grows with the logarithm of its style's weight: of the way at the whole weight, by
 /// log(1 + (g − 1) share) / log g with this g, the mean of what figures do in various styles.
-constexpr double weight_growth = 70.0;
+constexpr double weight_growth = 80.0;
 
 class StyleTerm final : public JetTermOf<StyleTerm> {
  public:

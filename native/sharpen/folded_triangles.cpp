@@ -12,14 +12,18 @@ void require_moved(PointsIn vertices, PointsIn moved) {
   require(moved.allFinite(), "moved", "some coordinates are NaN or infinite", "all must be finite");
 }
 
-Points turned_normals(const WeldedSurface& surface, const std::vector<double>& rotations) {
-  Points result = surface.normals(surface.rest());
+bool is_folded(const WeldedSurface& surface, Index triangle, const Points& positions,
+               const std::vector<Mat3>& rotations) {
+  Mat3 sum = Mat3::Zero();
+  for (int k = 0; k < 3; ++k) sum += rotations[surface.corners()(triangle, k)];
+  return (sum * surface.normal(triangle, surface.rest())).dot(surface.normal(triangle, positions)) < 0.0;
+}
+
+std::vector<char> all_folded(const WeldedSurface& surface, const Points& positions,
+                             const std::vector<Mat3>& rotations) {
+  std::vector<char> result(surface.triangles());
   parallel_for(0, surface.triangles(), 4096, [&](Index begin, Index end) {
-    for (Index t = begin; t < end; ++t) {
-      Mat3 sum = Mat3::Zero();
-      for (int k = 0; k < 3; ++k) sum += rotation_at(rotations, surface.corners()(t, k));
-      result.row(t) = result.row(t) * sum.transpose();
-    }
+    for (Index t = begin; t < end; ++t) result[t] = is_folded(surface, t, positions, rotations);
   });
   return result;
 }
@@ -29,11 +33,12 @@ std::vector<Index> folded_triangles(PointsIn vertices, TrianglesIn triangles, Po
   require_moved(vertices, moved);
   const WeldedSurface surface({vertices, triangles}, moved);
   const Points positions = surface.at_nodes(moved);
-  const Points expected = turned_normals(surface, surface.rotations(positions));
-  const Points normals = surface.normals(positions);
+  std::vector<Mat3> rotations;
+  surface.rotations(positions, rotations);
+  const std::vector<char> folded = all_folded(surface, positions, rotations);
   std::vector<Index> result;
   for (Index t = 0; t < surface.triangles(); ++t)
-    if (expected.row(t).dot(normals.row(t)) < 0.0) result.push_back(surface.row_of()[t]);
+    if (folded[t]) result.push_back(surface.row_of()[t]);
   return result;
 }
 

@@ -15,8 +15,13 @@ namespace arapfields {
 ARAPFIELDS_EXPORT std::vector<Index> folded_triangles(PointsIn vertices, TrianglesIn triangles,
                                                       PointsIn moved);
 
-/// (m',3) where the rotations of their corners turn the triangles' rest normals.
-Points turned_normals(const WeldedSurface& surface, const std::vector<double>& rotations);
+/// Whether a triangle faces away from where these rotations of the nodes turn it.
+bool is_folded(const WeldedSurface& surface, Index triangle, const Points& positions,
+               const std::vector<Mat3>& rotations);
+
+/// The triangles of the surface that are folded: one char for each.
+std::vector<char> all_folded(const WeldedSurface& surface, const Points& positions,
+                             const std::vector<Mat3>& rotations);
 
 /// As many vertices as the mesh has, all finite; throws InvalidInput that names `moved`.
 void require_moved(PointsIn vertices, PointsIn moved);

@@ -12,6 +12,7 @@
 #include "energies/gauss.h"
 #include "energies/rotation.h"
 #include "mesh/outward_triangles.h"
+#include "sharpen/contact_limits.h"
 #include "sharpen/folded_triangles.h"
 #include "sharpen/surface_laplacian.h"
 
@@ -29,6 +30,8 @@ constexpr double clear_lead = 0.15, one_face = 0.9659258262890683;
 /// which it is part of a detail, and from which on it is not; and the share of the style's weight for
 /// details.
 constexpr double detail_reach = 0.02, on_detail = 0.85, off_detail = 0.96, detail_weight = 0.1;
+/// Share of the last step by which the next one starts ahead: half as many steps then do as well.
+constexpr double momentum = 0.6;
 /// Residual of a global step's system, relative to that at its start.
 constexpr double solve_tolerance = 0.05;
 /// Rounds in which folded triangles are opened, and in which what lies around them gets its shape back, a
@@ -104,7 +107,7 @@ Vector relief_shares(const WeldedSurface& surface, const Progress& progress) {
   const double reach = detail_reach * diagonal_of(surface.rest());
   const Vector bound = areas / (reach * reach);
   const std::vector<char> none(surface.nodes(), 0);
-  const SurfaceLaplacian laplacian(surface, Vector::Ones(surface.triangles()), none, progress, bound);
+  SurfaceLaplacian laplacian(surface, Vector::Ones(surface.triangles()), none, progress, bound);
   Points smoothed = at_nodes;
   laplacian.solve(Points::Zero(surface.nodes(), 3), at_nodes, solve_tolerance, smoothed);
   Vector result(surface.triangles());
@@ -122,53 +125,115 @@ Vector relief_shares(const WeldedSurface& surface, const Progress& progress) {
 class Finish {
  public:
   Finish(const WeldedSurface& surface, Points start, const StyleAtTriangles& style, const Vector& factors,
-         const std::vector<char>& held, const Progress& progress)
+         const std::vector<char>& held, const Contact& contact, const Progress& progress)
       : surface_(surface),
         style_(style),
         factors_(factors),
         held_(held),
         start_(std::move(start)),
         positions_(start_),
-        rotations_(surface.rotations(start_)),
-        laplacian_(surface, (factors.array() + 2.0).matrix(), held, progress) {}
+        limits_(contact, start_, progress),
+        laplacian_(surface, (factors.array() + 2.0).matrix(), held, progress) {
+    surface.rotations(positions_, rotations_);
+    folded_before_ = all_folded(surface, positions_, rotations_);
+  }
 
   void step() {
-    laplacian_.solve(right_hand_side(), start_, solve_tolerance, positions_);
-    rotations_ = surface_.rotations(positions_);
+    if (before_.rows() > 0) {
+      Points ahead = positions_ + momentum * (positions_ - before_);
+      std::swap(before_, positions_);
+      std::swap(ahead, positions_);
+      surface_.rotations(positions_, rotations_);
+    } else {
+      before_ = positions_;
+    }
+    set_right_hand_side();
+    laplacian_.solve(right_, start_, solve_tolerance, positions_);
+    if (!limits_.any()) return;
+    // What has come to an obstacle stays there, and the rest gives way.
+    std::vector<char> kept = limits_.keep(positions_);
+    if (std::find(kept.begin(), kept.end(), 1) == kept.end()) return;
+    for (std::size_t i = 0; i < kept.size(); ++i) kept[i] = kept[i] || held_[i];
+    laplacian_.solve(right_, start_, solve_tolerance, positions_, kept);
+    limits_.keep(positions_);
+  }
+
+  /// Moves the whole along a unit vector so that its lowest node keeps its height.
+  void stand(const Vec3& up) {
+    const double sunk = (start_ * up).minCoeff() - (positions_ * up).minCoeff();
+    positions_.rowwise() += sunk * up.transpose();
+    limits_.keep(positions_);
   }
 
   /// Opens triangles that are folded but were not at the start, one vertex of each at a time; where that does
   /// not help, gives what lies around them its shape at the start, in more and more rings; at last takes the
   /// whole back.
   void spare_folds() {
-    const std::vector<char> before = folded(start_, surface_.rotations(start_));
+    surface_.rotations(positions_, rotations_);
+    std::vector<std::int32_t> found = newly_folded();
     double share = 1.0;
-    for (int round = 0;; ++round) {
-      const std::vector<double> turns = surface_.rotations(positions_);
-      std::vector<char> now = folded(positions_, turns);
-      Index found = 0;
-      for (Index t = 0; t < surface_.triangles(); ++t) {
-        now[t] = now[t] && !before[t];
-        found += now[t];
-      }
-      if (found == 0) return;
+    for (int round = 0; !found.empty(); ++round) {
+      std::vector<std::int32_t> moved;
       if (round < most_openings) {
-        for (Index t = 0; t < surface_.triangles(); ++t)
-          if (now[t]) open(t, turns);
+        for (const std::int32_t t : found)
+          if (const std::int32_t node = open(t); node >= 0) moved.push_back(node);
       } else if (round < most_openings + most_relaxations) {
-        for (Index t = 0; t < surface_.triangles(); ++t)
-          if (now[t]) relax(nodes_around(t, 1 + (round - most_openings) / rounds_a_ring));
+        for (const std::int32_t t : found) {
+          const std::vector<std::int32_t> nodes =
+              nodes_around(t, 1 + (round - most_openings) / rounds_a_ring);
+          relax(nodes);
+          moved.insert(moved.end(), nodes.begin(), nodes.end());
+        }
       } else {
         const double smaller = share > least_share ? 0.5 * share : 0.0;
         positions_ = start_ + smaller / share * (positions_ - start_);
         share = smaller;
+        limits_.keep(positions_);
+        surface_.rotations(positions_, rotations_);
+        found = newly_folded();
+        continue;
       }
+      if (limits_.any()) {
+        const std::vector<char> kept = limits_.keep(positions_);
+        for (Index i = 0; i < surface_.nodes(); ++i)
+          if (kept[i]) moved.push_back(static_cast<std::int32_t>(i));
+      }
+      found = newly_folded(moved, found);
     }
   }
 
   const Points& positions() const { return positions_; }
 
  private:
+  std::vector<std::int32_t> newly_folded() const {
+    const std::vector<char> now = all_folded(surface_, positions_, rotations_);
+    std::vector<std::int32_t> result;
+    for (Index t = 0; t < surface_.triangles(); ++t)
+      if (now[t] && !folded_before_[t]) result.push_back(static_cast<std::int32_t>(t));
+    return result;
+  }
+
+  /// The same after these nodes have moved since it was `found`.
+  std::vector<std::int32_t> newly_folded(const std::vector<std::int32_t>& moved,
+                                         const std::vector<std::int32_t>& found) {
+    const auto sorted = [](std::vector<std::int32_t> list) {
+      std::sort(list.begin(), list.end());
+      list.erase(std::unique(list.begin(), list.end()), list.end());
+      return list;
+    };
+    std::vector<std::int32_t> turned = moved, near = found, result;
+    for (const std::int32_t i : sorted(moved))
+      turned.insert(turned.end(), surface_.neighbours().begin() + surface_.first_neighbour()[i],
+                    surface_.neighbours().begin() + surface_.first_neighbour()[i + 1]);
+    for (const std::int32_t i : sorted(std::move(turned))) {
+      rotations_[i] = surface_.rotation(i, positions_);
+      surface_.around(i, [&](Index t, int) { near.push_back(static_cast<std::int32_t>(t)); });
+    }
+    for (const std::int32_t t : sorted(std::move(near)))
+      if (!folded_before_[t] && is_folded(surface_, t, positions_, rotations_)) result.push_back(t);
+    return result;
+  }
+
   /// Nodes within that many rings of a triangle.
   std::vector<std::int32_t> nodes_around(Index triangle, int rings) const {
     std::vector<std::int32_t> result;
@@ -217,8 +282,8 @@ class Finish {
   }
 
   /// Gives a triangle the height over its longest edge that it has at the start: of a thin triangle the
-  /// vertex there hardly moves.
-  void open(Index t, const std::vector<double>& turns) {
+  /// vertex there hardly moves. Returns its node; −1 where none moves.
+  std::int32_t open(Index t) {
     int apex = 0;
     double longest = -1.0;
     const auto corner = [&](int k) { return surface_.corners()(t, k % 3); };
@@ -229,63 +294,54 @@ class Finish {
         apex = k;
       }
     }
-    if (!(longest > 0.0)) return;
+    if (!(longest > 0.0)) return -1;
     const auto from = corner(apex + 1), to = corner(apex + 2);
     const Vec3 base = start_.row(to) - start_.row(from), side = start_.row(corner(apex)) - start_.row(from);
     const double along = side.dot(base) / longest;
     const Vec3 height = side - along * base, edge = positions_.row(to) - positions_.row(from);
     // The height lies across the edge in the plane that the triangle should have.
     Mat3 turn = Mat3::Zero();
-    for (int k = 0; k < 3; ++k) turn += rotation_at(turns, corner(k));
+    for (int k = 0; k < 3; ++k) turn += rotations_[corner(k)];
     const Vec3 rest[3] = {surface_.rest().row(from), surface_.rest().row(to),
                           surface_.rest().row(corner(apex))};
     const Vec3 normal = turn * (rest[1] - rest[0]).cross(rest[2] - rest[0]);
     const Vec3 across = normal.cross(edge);
-    if (!(across.norm() > 0.0)) return;
+    if (!(across.norm() > 0.0)) return -1;
     positions_.row(corner(apex)) =
         positions_.row(from) + (along * edge + height.norm() / across.norm() * across).transpose();
+    return corner(apex);
   }
 
   /// Of the global step: Σ of each node's edges of w ((R_i + R_j) e + λ p), p an edge without its part along
   /// the direction that pulls.
-  Points right_hand_side() const {
-    RowMatrix<double> edges(surface_.triangles(), 9);  // of each triangle, the edge opposite each corner
-    const Points normals = unit_rows(surface_.normals(positions_));
+  void set_right_hand_side() {
+    pulls_.resize(surface_.triangles(), 3);  // the directions, by the root of how much they pull
     parallel_for(0, surface_.triangles(), sharpen_grain, [&](Index begin, Index end) {
       for (Index t = begin; t < end; ++t) {
-        const auto [pulling, pull] = style_.direction(t, normals.row(t));
-        Mat3 turns[3];
-        for (int k = 0; k < 3; ++k) turns[k] = rotation_at(rotations_, surface_.corners()(t, k));
-        for (int k = 0; k < 3; ++k) {
-          const int from = (k + 1) % 3, to = (k + 2) % 3;
-          const Index i = surface_.corners()(t, from), j = surface_.corners()(t, to);
-          const Vec3 rest = surface_.rest().row(j) - surface_.rest().row(i);
-          Vec3 edge = positions_.row(j) - positions_.row(i);
-          edge -= pull * edge.dot(pulling) * pulling;
-          edges.row(t).segment<3>(3 * k) =
-              surface_.weights()(t, k) * ((turns[from] + turns[to]) * rest + factors_[t] * edge).transpose();
-        }
+        const auto [pulling, pull] = style_.direction(t, surface_.normal(t, positions_).normalized());
+        pulls_.row(t) = std::sqrt(pull) * pulling;
       }
     });
-    Points result(surface_.nodes(), 3);
+    right_.resize(surface_.nodes(), 3);
     parallel_for(0, surface_.nodes(), sharpen_grain, [&](Index begin, Index end) {
       for (Index i = begin; i < end; ++i) {
-        Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+        Vec3 sum = Vec3::Zero();
+        for (std::int32_t at = surface_.first_neighbour()[i]; at < surface_.first_neighbour()[i + 1]; ++at) {
+          const std::int32_t j = surface_.neighbours()[at];
+          const Vec3 edge = surface_.rest().row(i) - surface_.rest().row(j);
+          sum += surface_.edge_weights()[at] * ((rotations_[i] + rotations_[j]) * edge);
+        }
         surface_.around(i, [&](Index t, int k) {
-          sum += edges.row(t).segment<3>(3 * ((k + 1) % 3)) - edges.row(t).segment<3>(3 * ((k + 2) % 3));
+          const Vec3 pull = pulls_.row(t);
+          for (int other = 1; other < 3; ++other) {
+            const int l = (k + other) % 3;
+            const Vec3 edge = positions_.row(i) - positions_.row(surface_.corners()(t, l));
+            sum += factors_[t] * surface_.weights()(t, 3 - k - l) * (edge - edge.dot(pull) * pull);
+          }
         });
-        result.row(i) = sum;
+        right_.row(i) = sum;
       }
     });
-    return result;
-  }
-
-  std::vector<char> folded(const Points& positions, const std::vector<double>& turns) const {
-    const Points expected = turned_normals(surface_, turns);
-    const Points normals = surface_.normals(positions);
-    std::vector<char> result(surface_.triangles());
-    for (Index t = 0; t < surface_.triangles(); ++t) result[t] = expected.row(t).dot(normals.row(t)) < 0.0;
-    return result;
   }
 
   const WeldedSurface& surface_;
@@ -293,16 +349,19 @@ class Finish {
   const Vector& factors_;
   const std::vector<char>& held_;
   const Points start_;
-  Points positions_;
-  std::vector<double> rotations_;
+  Points positions_, before_;
+  std::vector<Mat3> rotations_;
+  std::vector<char> folded_before_;
+  ContactLimits limits_;
   SurfaceLaplacian laplacian_;
+  Points pulls_, right_;  // of the global step
 };
 
 }  // namespace
 
 Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const Style& style,
                const SharpenOptions& options, const Progress& progress, const Vector& weights,
-               const std::optional<Vec3>& up) {
+               const std::optional<Vec3>& up, const Contact& contact) {
   options.validate();
   validate(vertices, triangles);
   require_moved(vertices, moved);
@@ -312,12 +371,17 @@ Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const S
   require(weights.size() == 0 || (weights.allFinite() && weights.minCoeff() >= 0.0), "weights",
           "some are negative or not finite", "all must be 0 or larger");
   require(!up || (up->allFinite() && up->norm() > 0.0), "up", "zero or not finite", "a direction is needed");
+  require_contact(contact);
+  require(!contact.itself, "contact", "a surface's contact with itself",
+          "obstacles and the ground are allowed");
   require_memory("vertices", bytes_per_vertex * static_cast<double>(vertices.rows()));
   const ThreadScope threads(options.threads);
   const CancelScope cancel(progress);
 
   progress.report(0.0, "sharpening");
-  const WeldedSurface surface(facing_outwards({vertices, triangles}), moved);
+  const TriangleMesh mesh = facing_outwards({vertices, triangles});
+  progress.check();
+  const WeldedSurface surface(mesh, moved, progress);
   const StyleAtTriangles at(style, surface, options);
   const double weight = options.style_weight * at.share / options.rigidity;
   Vector factors = weight * at.factors;
@@ -338,23 +402,19 @@ Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const S
   Points result = moved;
   if (surface.triangles() == 0 || options.iterations == 0 || !(factors.maxCoeff() > 0.0)) return result;
 
-  Finish finish(surface, surface.at_nodes(moved), at, factors, held, progress);
+  Finish finish(surface, surface.at_nodes(moved), at, factors, held, contact, progress);
   for (Index step = 0; step < options.iterations; ++step) {
     progress.report(0.1 + 0.85 * static_cast<double>(step) / static_cast<double>(options.iterations),
                     "sharpening");
     finish.step();
   }
   progress.report(0.95, "sharpening");
+  if (up && std::find(held.begin(), held.end(), 1) == held.end()) finish.stand(up->normalized());
   finish.spare_folds();
   for (Index v = 0; v < vertices.rows(); ++v)
     if (const std::int32_t node = surface.node_of()[v]; node >= 0) {
       if (!held[node]) result.row(v) = finish.positions().row(node);
     }
-  if (up && std::find(held.begin(), held.end(), 1) == held.end()) {
-    const Vec3 direction = up->normalized();
-    const double sunk = (moved * direction).minCoeff() - (result * direction).minCoeff();
-    result.rowwise() += sunk * direction.transpose();
-  }
   progress.report(1.0, "sharpening");
   return result;
 }

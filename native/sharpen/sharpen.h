@@ -6,6 +6,7 @@
 #include "core/task.h"
 #include "energies/style.h"
 #include "options/sharpen.h"
+#include "solve/contact.h"
 
 namespace arapfields {
 
@@ -19,10 +20,13 @@ inline constexpr int centers_before_sharpen = 500;
 /// 2019, "Cubic Stylization"). No triangle is folded that is not in `moved` (folded_triangles()).
 /// `weights` (n; empty: all 1) scale the effect at each vertex; where they are 0 vertices stay. Vertices of
 /// one place that have stayed together do so; loose vertices stay, too. With `up`, and no vertex held, the
-/// lowest along it keeps its height. Throws InvalidInput for a broken mesh, for moved vertices, weights or
-/// options that do not fit; Cancelled.
+/// lowest along it keeps its height. In `contact`, vertices enter no obstacle and do not pass the ground;
+/// those that are inside or nearer than a margin in `moved` go no further. Self-contact is refused: it would
+/// take searches for other parts in each step. Throws InvalidInput for a broken mesh, for moved vertices,
+/// weights or options that do not fit; Cancelled.
 ARAPFIELDS_EXPORT Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const Style& style,
                                  const SharpenOptions& options = {}, const Progress& progress = {},
-                                 const Vector& weights = {}, const std::optional<Vec3>& up = {});
+                                 const Vector& weights = {}, const std::optional<Vec3>& up = {},
+                                 const Contact& contact = {});
 
 }  // namespace arapfields

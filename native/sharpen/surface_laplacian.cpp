@@ -89,24 +89,13 @@ Graph grouped(const Graph& graph, const std::vector<std::int32_t>& group_of, Ind
   return result;
 }
 
-/// Σ of the products of entries, in an order that follows from the size alone.
-double inner(const Points& a, const Points& b) {
-  const Index chunks = (a.rows() + laplacian_grain - 1) / laplacian_grain;
-  Vector parts(chunks);
-  parallel_for(0, chunks, 1, [&](Index begin, Index end) {
-    for (Index c = begin; c < end; ++c) {
-      const Index from = c * laplacian_grain, rows = std::min(laplacian_grain, a.rows() - from);
-      parts[c] = a.middleRows(from, rows).cwiseProduct(b.middleRows(from, rows)).sum();
-    }
-  });
+/// Σ of body(begin, end) over chunks of nodes, in an order that follows from their number alone.
+template <class Body>
+double sum_over(Index nodes, const Body& body) {
+  Vector parts = Vector::Zero((nodes + laplacian_grain - 1) / laplacian_grain);
+  parallel_for(0, nodes, laplacian_grain,
+               [&](Index begin, Index end) { parts[begin / laplacian_grain] = body(begin, end); });
   return parts.sum();
-}
-
-/// a += factor · b.
-void add(double factor, const Points& b, Points& a) {
-  parallel_for(0, a.rows(), laplacian_grain, [&](Index begin, Index end) {
-    a.middleRows(begin, end - begin) += factor * b.middleRows(begin, end - begin);
-  });
 }
 
 }  // namespace
@@ -114,35 +103,18 @@ void add(double factor, const Points& b, Points& a) {
 SurfaceLaplacian::SurfaceLaplacian(const WeldedSurface& surface, const Vector& factors,
                                    const std::vector<char>& held, const Progress& progress,
                                    const Vector& bound)
-    : held_(held) {
+    : surface_(surface), weight_(surface.edge_weights(factors)), held_(held) {
   Graph graph;
+  graph.first = surface.first_neighbour();
+  graph.neighbour = surface.neighbours();
+  graph.weight = weight_;
   graph.held = held;
   graph.diagonal.setZero(surface.nodes());
-  std::vector<std::pair<std::int32_t, double>> row;
-  for (Index i = 0; i < surface.nodes(); ++i) {
-    if (i % 16384 == 0) progress.check();
-    row.clear();
-    surface.around(i, [&](Index t, int k) {
-      for (int other = 1; other < 3; ++other) {
-        const int l = (k + other) % 3;
-        row.emplace_back(surface.corners()(t, l), factors[t] * surface.weights()(t, 3 - k - l));
-      }
-    });
-    std::sort(row.begin(), row.end());
-    for (std::size_t k = 0; k < row.size(); ++k) {
-      graph.diagonal[i] += row[k].second;
-      if (k > 0 && row[k].first == row[k - 1].first) {
-        graph.weight.back() += row[k].second;
-        continue;
-      }
-      graph.neighbour.push_back(row[k].first);
-      graph.weight.push_back(row[k].second);
-    }
-    graph.first.push_back(static_cast<std::int32_t>(graph.neighbour.size()));
-  }
+  for (Index i = 0; i < surface.nodes(); ++i)
+    for (std::int32_t at = graph.first[i]; at < graph.first[i + 1]; ++at) graph.diagonal[i] += weight_[at];
   bound_ = bound.size() > 0 ? bound : Vector(binding * graph.diagonal);
   graph.diagonal += bound_;
-  first_ = graph.first, neighbour_ = graph.neighbour, weight_ = graph.weight, diagonal_ = graph.diagonal;
+  diagonal_ = graph.diagonal;
   inverse_diagonal_ = diagonal_.cwiseInverse();
 
   for (Index size = graph.size(); size > coarsest_size;) {
@@ -179,73 +151,85 @@ SurfaceLaplacian::SurfaceLaplacian(const WeldedSurface& surface, const Vector& f
   if (graph.size() > 0) coarsest_.compute(matrix);
 }
 
-Points SurfaceLaplacian::product(const Points& x) const {
-  Points result(x.rows(), 3);
-  parallel_for(0, x.rows(), laplacian_grain, [&](Index begin, Index end) {
+double SurfaceLaplacian::multiply(const Points& x, Points& product) const {
+  product.resize(x.rows(), 3);
+  const std::vector<std::int32_t>&first = surface_.first_neighbour(), &neighbours = surface_.neighbours();
+  return sum_over(x.rows(), [&](Index begin, Index end) {
+    double inner = 0.0;
     for (Index i = begin; i < end; ++i) {
-      Eigen::RowVector3d sum = diagonal_[i] * x.row(i);
-      for (std::int32_t at = first_[i]; at < first_[i + 1]; ++at) sum -= weight_[at] * x.row(neighbour_[at]);
-      result.row(i) = held_[i] ? Eigen::RowVector3d::Zero() : sum;
+      Vec3 sum = Vec3::Zero();
+      if (!still_[i]) {
+        sum = diagonal_[i] * x.row(i);
+        for (std::int32_t at = first[i]; at < first[i + 1]; ++at) sum -= weight_[at] * x.row(neighbours[at]);
+      }
+      product.row(i) = sum;
+      inner += sum.dot(x.row(i));
     }
+    return inner;
   });
-  return result;
 }
 
-Points SurfaceLaplacian::preconditioned(const Points& residual) const {
-  std::vector<Points> sums;
+double SurfaceLaplacian::precondition(const Points& residual, Points& step) {
   for (std::size_t l = 0; l < levels_.size(); ++l) {
-    const Level& level = levels_[l];
-    const Points& fine = l == 0 ? residual : sums.back();
-    Points coarse(static_cast<Index>(level.first.size()) - 1, 3);
-    parallel_for(0, coarse.rows(), laplacian_grain, [&](Index begin, Index end) {
+    Level& level = levels_[l];
+    const Points& fine = l == 0 ? residual : levels_[l - 1].sums;
+    level.sums.resize(static_cast<Index>(level.first.size()) - 1, 3);
+    parallel_for(0, level.sums.rows(), laplacian_grain, [&](Index begin, Index end) {
       for (Index g = begin; g < end; ++g) {
-        Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+        Vec3 sum = Vec3::Zero();
         for (std::int32_t at = level.first[g]; at < level.first[g + 1]; ++at)
           sum += fine.row(level.members[at]);
-        coarse.row(g) = sum;
+        level.sums.row(g) = sum;
       }
     });
-    sums.push_back(std::move(coarse));
   }
-  const Points& coarsest = levels_.empty() ? residual : sums.back();
-  Points correction = coarsest;
-  if (coarsest.rows() > 0) correction = coarsest_.solve(coarsest).eval();
+  const Points& coarsest = levels_.empty() ? residual : levels_.back().sums;
+  Points& solved = levels_.empty() ? step : levels_.back().correction;
+  if (coarsest.rows() > 0) solved = coarsest_.solve(coarsest);
   for (std::size_t l = levels_.size(); l-- > 0;) {
-    const Points& fine = l == 0 ? residual : sums[l - 1];
+    const Points& fine = l == 0 ? residual : levels_[l - 1].sums;
     const Vector& inverse = l == 0 ? inverse_diagonal_ : levels_[l - 1].inverse_diagonal;
-    Points finer(fine.rows(), 3);
+    Points& finer = l == 0 ? step : levels_[l - 1].correction;
+    finer.resize(fine.rows(), 3);
     parallel_for(0, fine.rows(), laplacian_grain, [&](Index begin, Index end) {
       for (Index i = begin; i < end; ++i) {
         const std::int32_t g = levels_[l].group_of[i];
         finer.row(i) = inverse[i] * fine.row(i);
-        if (g >= 0) finer.row(i) += correction.row(g);
+        if (g >= 0) finer.row(i) += levels_[l].correction.row(g);
+        if (l == 0 && still_[i]) finer.row(i).setZero();
       }
     });
-    correction = std::move(finer);
   }
-  return correction;
+  if (levels_.empty())
+    for (Index i = 0; i < step.rows(); ++i)
+      if (still_[i]) step.row(i).setZero();
+  return sum_over(residual.rows(), [&](Index begin, Index end) {
+    return residual.middleRows(begin, end - begin).cwiseProduct(step.middleRows(begin, end - begin)).sum();
+  });
 }
 
-void SurfaceLaplacian::solve(const Points& right, const Points& places, double tolerance, Points& x) const {
-  Points residual = product(x);
+void SurfaceLaplacian::solve(const Points& right, const Points& places, double tolerance, Points& x,
+                             const std::vector<char>& still) {
+  still_ = still.empty() ? held_ : still;
+  multiply(x, residual_);
   parallel_for(0, x.rows(), laplacian_grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i)
-      if (!held_[i]) residual.row(i) = right.row(i) + bound_[i] * places.row(i) - residual.row(i);
+      if (!still_[i]) residual_.row(i) = right.row(i) + bound_[i] * places.row(i) - residual_.row(i);
   });
-  Points step = preconditioned(residual);
-  Points direction = step;
-  double product_now = inner(residual, step);
+  double product_now = precondition(residual_, step_);
+  direction_ = step_;
   const double enough = tolerance * tolerance * product_now;
   for (int iteration = 0; iteration < most_iterations && product_now > enough; ++iteration) {
-    const Points image = product(direction);
-    const double length = product_now / inner(direction, image);
-    add(length, direction, x);
-    add(-length, image, residual);
-    step = preconditioned(residual);
-    const double product_next = inner(residual, step), share = product_next / product_now;
+    const double length = product_now / multiply(direction_, image_);
     parallel_for(0, x.rows(), laplacian_grain, [&](Index begin, Index end) {
-      direction.middleRows(begin, end - begin) =
-          step.middleRows(begin, end - begin) + share * direction.middleRows(begin, end - begin);
+      const auto rows = [&](auto& all) { return all.middleRows(begin, end - begin); };
+      rows(x) += length * rows(direction_);
+      rows(residual_) -= length * rows(image_);
+    });
+    const double product_next = precondition(residual_, step_), share = product_next / product_now;
+    parallel_for(0, x.rows(), laplacian_grain, [&](Index begin, Index end) {
+      const auto rows = [&](auto& all) { return all.middleRows(begin, end - begin); };
+      rows(direction_) = rows(step_) + share * rows(direction_);
     });
     product_now = product_next;
   }

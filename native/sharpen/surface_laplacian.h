@@ -17,13 +17,15 @@ namespace arapfields {
 class SurfaceLaplacian {
  public:
   /// `factors` (m') of the triangles; `held` (k) 1 for nodes that stay; `bound` (k) weights that bind nodes
-  /// to their places, or empty: weak ones.
+  /// to their places, or empty: weak ones. `surface` must outlive it.
   SurfaceLaplacian(const WeldedSurface& surface, const Vector& factors, const std::vector<char>& held,
                    const Progress& progress, const Vector& bound = {});
 
   /// Moves x (k,3) towards the solution for the right-hand side (k,3) of the edges, until the residual is
   /// `tolerance` of that at the start; `places` (k,3) are those that nodes are bound to.
-  void solve(const Points& right, const Points& places, double tolerance, Points& x) const;
+  /// `still` (k): 1 for nodes that stay this time, the held ones among them; empty: these alone.
+  void solve(const Points& right, const Points& places, double tolerance, Points& x,
+             const std::vector<char>& still = {});
 
  private:
   /// Groups of the nodes of the level before.
@@ -32,19 +34,21 @@ class SurfaceLaplacian {
     std::vector<std::int32_t> first;     // of each group in `members`, and the end
     std::vector<std::int32_t> members;   // nodes of the groups
     Vector inverse_diagonal;             // of the groups' matrix; of the coarsest, unused
+    Points sums, correction;             // of the groups, while it preconditions
   };
-  Points product(const Points& x) const;
-  Points preconditioned(const Points& residual) const;
+  /// Both return the sum of the products of their two entries.
+  double multiply(const Points& x, Points& product) const;
+  double precondition(const Points& residual, Points& step);
 
-  std::vector<std::int32_t> first_;  // of each node in `neighbour_` and `weight_`, and the end
-  std::vector<std::int32_t> neighbour_;
-  std::vector<double> weight_;
+  const WeldedSurface& surface_;
+  std::vector<double> weight_;  // of the surface's edges
   Vector diagonal_;
   Vector inverse_diagonal_;
   Vector bound_;  // weights that bind nodes to their places
-  std::vector<char> held_;
+  std::vector<char> held_, still_;
   std::vector<Level> levels_;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> coarsest_;
+  Points residual_, step_, direction_, image_;  // while it solves
 };
 
 }  // namespace arapfields

@@ -17,11 +17,11 @@ constexpr double least_cotangent = 1e-3, most_cotangent = 300.0;
 constexpr double no_area = 1e-9;
 /// Share of the moved mesh's diagonal within which vertices of one rest place have stayed together.
 constexpr double together = 1e-6;
-constexpr Index surface_grain = 4096;
+constexpr Index surface_grain = 4096, rotations_at_once = 512, check_every = 16384;
 
 }  // namespace
 
-WeldedSurface::WeldedSurface(const TriangleMesh& mesh, PointsIn moved) {
+WeldedSurface::WeldedSurface(const TriangleMesh& mesh, PointsIn moved, const Progress& progress) {
   const Index count = mesh.vertices.rows();
   const std::vector<std::int32_t> first = first_at_position(mesh.vertices);
   const double near = together * diagonal_of(moved);
@@ -29,6 +29,7 @@ WeldedSurface::WeldedSurface(const TriangleMesh& mesh, PointsIn moved) {
   // The vertex that stands for each: the first at its place that has moved to the same one.
   std::vector<std::int32_t> stands(count), next(count, -1);
   for (Index v = 0; v < count; ++v) {
+    if (v % check_every == 0) progress.check();
     std::int32_t other = first[v];
     for (; (moved.row(other) - moved.row(v)).norm() > near; other = next[other])
       if (next[other] < 0) {
@@ -43,6 +44,7 @@ WeldedSurface::WeldedSurface(const TriangleMesh& mesh, PointsIn moved) {
   node_of_.assign(count, -1);
   std::vector<std::int32_t> kept;
   for (Index t = 0; t < mesh.triangles.rows(); ++t) {
+    if (t % check_every == 0) progress.check();
     const auto corner = [&](int k) -> Vec3 { return mesh.vertices.row(mesh.triangles(t, k % 3)); };
     const double area = (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
     double longest = 0.0;
@@ -65,6 +67,7 @@ WeldedSurface::WeldedSurface(const TriangleMesh& mesh, PointsIn moved) {
   }
   for (Index v = 0; v < count; ++v) node_of_[v] = node_of_[stands[v]];
 
+  progress.check();
   corners_ = Eigen::Map<const Triangles>(kept.data(), static_cast<Index>(kept.size()) / 3, 3);
   weights_ = Eigen::Map<const Points>(cotangents.empty() ? nullptr : cotangents[0].data(),
                                       static_cast<Index>(cotangents.size()), 3);
@@ -75,6 +78,27 @@ WeldedSurface::WeldedSurface(const TriangleMesh& mesh, PointsIn moved) {
   around_.resize(kept.size());
   std::vector<std::int32_t> free(first_.begin(), first_.end() - 1);
   for (std::size_t at = 0; at < kept.size(); ++at) around_[free[kept[at]]++] = static_cast<std::int32_t>(at);
+
+  // Each node's list has room for two of each triangle's corners at first.
+  std::vector<std::int32_t> lists(2 * around_.size());
+  first_neighbour_.assign(vertex_of_.size() + 1, 0);
+  parallel_for(0, nodes(), surface_grain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      const auto list = lists.begin() + 2 * first_[i];
+      auto last = list;
+      around(i, [&](Index t, int k) {
+        for (int other = 1; other < 3; ++other) *last++ = corners_(t, (k + other) % 3);
+      });
+      std::sort(list, last);
+      first_neighbour_[i + 1] = static_cast<std::int32_t>(std::unique(list, last) - list);
+    }
+  });
+  for (std::size_t i = 1; i < first_neighbour_.size(); ++i) first_neighbour_[i] += first_neighbour_[i - 1];
+  neighbours_.resize(first_neighbour_.back());
+  for (Index i = 0; i < nodes(); ++i)
+    std::copy_n(lists.begin() + 2 * first_[i], first_neighbour_[i + 1] - first_neighbour_[i],
+                neighbours_.begin() + first_neighbour_[i]);
+  edge_weights_ = edge_weights(Vector::Ones(triangles()));
 }
 
 Points WeldedSurface::at_nodes(PointsIn moved) const {
@@ -86,37 +110,57 @@ Points WeldedSurface::at_nodes(PointsIn moved) const {
 Points WeldedSurface::normals(const Points& positions) const {
   Points result(triangles(), 3);
   parallel_for(0, triangles(), surface_grain, [&](Index begin, Index end) {
-    for (Index t = begin; t < end; ++t) {
-      const auto corner = [&](int k) -> Vec3 { return positions.row(corners_(t, k)); };
-      result.row(t) = (corner(1) - corner(0)).cross(corner(2) - corner(0));
-    }
+    for (Index t = begin; t < end; ++t) result.row(t) = normal(t, positions);
   });
   return result;
 }
 
-std::vector<double> WeldedSurface::rotations(const Points& positions) const {
-  const Index count = nodes();
-  const auto size = static_cast<std::size_t>(9 * count);
-  std::vector<double> spreads(size), result(size);
-  parallel_for(0, count, surface_grain, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) {
-      Mat3 spread = Mat3::Zero();
+std::vector<double> WeldedSurface::edge_weights(const Vector& factors) const {
+  std::vector<double> result(neighbours_.size());
+  parallel_for(0, nodes(), surface_grain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i)
       around(i, [&](Index t, int k) {
         for (int other = 1; other < 3; ++other) {
           const int l = (k + other) % 3;
-          const Index j = corners_(t, l);
-          spread += weights_(t, 3 - k - l) * (positions.row(j) - positions.row(i)).transpose() *
-                    (rest_.row(j) - rest_.row(i));
+          std::int32_t at = first_neighbour_[i];
+          while (neighbours_[at] != corners_(t, l)) ++at;
+          result[at] += factors[t] * weights_(t, 3 - k - l);
         }
       });
-      for (int k = 0; k < 3; ++k) {
-        Eigen::Map<Vec3> column(&spreads[static_cast<std::size_t>(3 * (k * count + i))]);
-        column = spread.col(k);
-      }
-    }
   });
-  closest_rotations<double>(spreads.data(), count, result.data());
   return result;
+}
+
+Mat3 WeldedSurface::spread(Index node, const Points& positions) const {
+  Mat3 result = Mat3::Zero();
+  for (std::int32_t at = first_neighbour_[node]; at < first_neighbour_[node + 1]; ++at) {
+    const Index j = neighbours_[at];
+    const Vec3 rest = edge_weights_[at] * (rest_.row(j) - rest_.row(node));
+    result += (positions.row(j) - positions.row(node)).transpose() * rest.transpose();
+  }
+  return result;
+}
+
+Mat3 WeldedSurface::rotation(Index node, const Points& positions) const {
+  return closest_rotation(spread(node, positions));
+}
+
+void WeldedSurface::rotations(const Points& positions, std::vector<Mat3>& result) const {
+  result.resize(static_cast<std::size_t>(nodes()));
+  parallel_for(0, nodes(), rotations_at_once, [&](Index begin, Index end) {
+    const Index count = end - begin;
+    std::vector<double> spreads(static_cast<std::size_t>(9 * count)), turns(spreads.size());
+    const auto column = [&](std::vector<double>& blocks, Index i, int k) {
+      return Eigen::Map<Vec3>(&blocks[static_cast<std::size_t>(3 * (k * count + i - begin))]);
+    };
+    for (Index i = begin; i < end; ++i) {
+      const Mat3 of_node = spread(i, positions);
+      for (int k = 0; k < 3; ++k) column(spreads, i, k) = of_node.col(k);
+    }
+    closest_rotations<double>(spreads.data(), count, turns.data());
+    for (Index i = begin; i < end; ++i)
+      for (int k = 0; k < 3; ++k) result[i].col(k) = column(turns, i, k);
+  });
 }
 
 }  // namespace arapfields

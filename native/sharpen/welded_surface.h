@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "core/task.h"
 #include "mesh/triangle_mesh.h"
 
 namespace arapfields {
@@ -13,7 +14,7 @@ namespace arapfields {
 class WeldedSurface {
  public:
   /// The mesh must be valid, with as many moved vertices.
-  WeldedSurface(const TriangleMesh& mesh, PointsIn moved);
+  WeldedSurface(const TriangleMesh& mesh, PointsIn moved, const Progress& progress = {});
 
   Index nodes() const { return rest_.rows(); }
   /// (n) of each vertex; −1 for one without a triangle that has area.
@@ -29,7 +30,12 @@ class WeldedSurface {
   const std::vector<std::int32_t>& row_of() const { return row_of_; }
   /// (m',3) of the edge opposite each corner: half its cotangent, within bounds, so that no edge pushes.
   const Points& weights() const { return weights_; }
-  /// (m',3) normals of the triangles for these positions (k,3) of the nodes, as long as twice their areas.
+  /// Of a triangle for these positions (k,3) of the nodes, as long as twice its area.
+  Vec3 normal(Index triangle, const Points& positions) const {
+    const auto corner = [&](int k) -> Vec3 { return positions.row(corners_(triangle, k)); };
+    return (corner(1) - corner(0)).cross(corner(2) - corner(0));
+  }
+  /// (m',3) of all triangles.
   Points normals(const Points& positions) const;
 
   /// Corners of triangles at a node: each 3·t + k.
@@ -38,11 +44,23 @@ class WeldedSurface {
     for (std::int32_t at = first_[node]; at < first_[node + 1]; ++at) visit(around_[at] / 3, around_[at] % 3);
   }
 
-  /// The rotation of each node, for these positions (k,3), that fits its triangles' edges best; as blocks
-  /// (3,k,3) like the first derivatives of a jet.
-  std::vector<double> rotations(const Points& positions) const;
+  /// The nodes that share an edge with node i, in ascending order: those of neighbours() from
+  /// first_neighbour()[i] on.
+  const std::vector<std::int32_t>& first_neighbour() const { return first_neighbour_; }
+  const std::vector<std::int32_t>& neighbours() const { return neighbours_; }
+  /// Of the edge to each of neighbours(): Σ of the weights in its triangles, times their factors (m').
+  std::vector<double> edge_weights(const Vector& factors) const;
+  /// The same with factors of 1.
+  const std::vector<double>& edge_weights() const { return edge_weights_; }
+
+  /// The rotation of a node, for these positions (k,3), that fits its edges best.
+  Mat3 rotation(Index node, const Points& positions) const;
+  /// Of all nodes.
+  void rotations(const Points& positions, std::vector<Mat3>& result) const;
 
  private:
+  Mat3 spread(Index node, const Points& positions) const;
+
   std::vector<std::int32_t> node_of_;
   std::vector<std::int32_t> vertex_of_;  // (k) one of each node's
   std::vector<std::int32_t> row_of_;
@@ -51,14 +69,9 @@ class WeldedSurface {
   Points weights_;
   std::vector<std::int32_t> first_;   // of each node in `around_`, and the end
   std::vector<std::int32_t> around_;  // its corners of triangles
+  std::vector<std::int32_t> first_neighbour_;
+  std::vector<std::int32_t> neighbours_;
+  std::vector<double> edge_weights_;
 };
-
-/// Rotation of a node among those of WeldedSurface::rotations().
-inline Mat3 rotation_at(const std::vector<double>& rotations, Index node) {
-  const Index count = static_cast<Index>(rotations.size()) / 9;
-  Mat3 result;
-  for (int k = 0; k < 3; ++k) result.col(k) = Eigen::Map<const Vec3>(&rotations[3 * (k * count + node)]);
-  return result;
-}
 
 }  // namespace arapfields

@@ -357,6 +357,7 @@ def test_the_picture_of_a_style_object_is_a_ball():
 # Stylize finishes on the mesh: wherever the result goes, but not where a field alone is wanted.
 
 EXACT = 1e-6  # single precision, of a ball of radius 1
+FAST = {"width": 256, "layers": 4, "batch": 500}  # the method that contact needs
 
 
 def angle(points, item):
@@ -390,13 +391,25 @@ def test_the_finish_brings_every_result_nearer_to_the_style(result):
     assert angle(finished, item) < 0.7 * angle(field_alone, item)
 
 
-def test_with_contact_the_field_stays():
-    def on_ground(item):
+def on_ground(**further):
+    def prepare(item):
         item.location.z = 1.0
         contact = item.arapfields.contact
         contact.use = contact.use_ground = True
+        for name, value in further.items():
+            setattr(contact, name, value)
 
-    _, finished, field_alone = both(prepare=on_ground, width=256, layers=4, batch=500)  # of the fast method
+    return prepare
+
+
+def test_nothing_passes_the_ground():
+    item, finished, field_alone = both(prepare=on_ground(), **FAST)
+    assert angle(finished, item) < 0.9 * angle(field_alone, item)
+    assert finished[:, 2].min() > min(0.0, field_alone[:, 2].min()) - EXACT
+
+
+def test_with_contact_of_the_surface_with_itself_the_field_stays():
+    _, finished, field_alone = both(prepare=on_ground(itself=True), **FAST)
     assert np.array_equal(finished, field_alone)
 
 

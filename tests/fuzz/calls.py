@@ -72,14 +72,14 @@ def calls(rng, things):
                 ],
             ),
             "sharpen": lambda: (
-                by_name(af.sharpen, "weights", "orientation", "up", "task"),
+                by_name(af.sharpen, "weights", "orientation", "up", "contact", "task"),
                 [
                     TETRAHEDRON,
                     FACES,
                     TETRAHEDRON,
                     "cube",
                     odd_options(rng, t, af.SharpenOptions, iterations=2, threads=1),
-                    *[np.ones(len(TETRAHEDRON)), np.eye(3), np.ones(3), task],
+                    *[np.ones(len(TETRAHEDRON)), np.eye(3), np.ones(3), af.Contact(ground=-1.0), task],
                 ],
             ),
             "folded_triangles": lambda: (af.folded_triangles, [TETRAHEDRON, FACES, TETRAHEDRON]),

@@ -13,6 +13,7 @@ import arapfields as af
 CUBE = np.concatenate([np.eye(3), -np.eye(3)])
 ALIKE = 1e-6  # of a size of about 1: what the conjugate gradients leave
 NONE_ROUNDED = 1e-12
+PLACED = 1e-5  # of a size of about 1: distances are in single precision
 
 
 def subdivided_box(times):
@@ -154,6 +155,60 @@ def test_the_lowest_vertex_keeps_its_height():
     assert abs((sharpened @ up).min() - (vertices @ up).min()) < NONE_ROUNDED
 
 
+CORNER = np.full(3, 3**-0.5)  # where a ball that becomes a cube bulges most
+
+
+def obstacle(name):
+    """In the way of that corner of a ball of radius 1."""
+    if name == "ground":
+        return af.Contact(ground=-1.0, up=-CORNER)
+    if name == "ball":
+        mesh, margin = (0.5 * sphere(1.0, 4)[0] + 1.53 * CORNER, sphere(1.0, 4)[1]), 0.02
+    elif name == "box":
+        mesh, margin = (box((1.0, 1.0, 1.0))[0], box()[1]), 0.0
+        mesh = mesh[0] - mesh[0].min(axis=0) + 1.01 * CORNER, mesh[1]
+    else:  # a sheet
+        across = np.linalg.svd(CORNER[None])[2][1:]
+        plate = np.array([[-2.0, -2], [2, -2], [2, 2], [-2, 2]]) @ across
+        mesh, margin = (plate + 1.005 * CORNER, np.array([[0, 1, 2], [0, 2, 3]])), 0.0
+    return af.Contact([af.Obstacle(af.MeshSdf(*mesh), margin)])
+
+
+@pytest.mark.parametrize("up", [None, [0.0, 0.0, -1.0]])
+@pytest.mark.parametrize("name", ["ground", "ball", "box", "sheet"])
+def test_nothing_enters_an_obstacle(name, up):
+    """Also what is beyond at the start goes no further; without the contact, something does."""
+    vertices, triangles = sphere(1.0, 4)
+    contact = obstacle(name)
+
+    def distances(points):
+        if name == "ground":
+            return 1.0 - points @ CORNER
+        if name == "sheet":
+            return 1.005 - points @ CORNER
+        return contact.obstacles[0].function(points) - contact.obstacles[0].margin
+
+    for moved in (vertices, 1.05 * vertices @ rotation(4).T):
+        least = np.minimum(distances(moved), 0.0)
+        free, kept = (
+            af.sharpen(vertices, triangles, moved, "cube", up=up, contact=each) for each in (None, contact)
+        )
+        if moved is vertices:
+            assert (distances(free) - least).min() < -0.02
+        assert name == "sheet" or (distances(kept) - least).min() > -PLACED
+        passed = distances(kept) * distances(moved) < 0
+        assert name != "sheet" or not passed.any()
+        assert angle_to_style(kept, triangles) < 0.8 * angle_to_style(moved, triangles)
+        assert len(af.folded_triangles(vertices, triangles, kept)) == 0
+
+
+def test_contact_out_of_reach_changes_nothing():
+    vertices, triangles = sphere(1.0, 4)
+    far = af.Contact([af.Obstacle(af.MeshSdf(vertices + 5.0, triangles))], ground=-3.0)
+    plain, beside = (af.sharpen(vertices, triangles, vertices, "cube", contact=c) for c in (None, far))
+    assert np.array_equal(plain, beside)
+
+
 def test_seams_stay_closed_and_loose_and_flat_parts_do_no_harm():
     """Each triangle with vertices of its own, a loose vertex, and triangles without area."""
     vertices, triangles = sphere(1.0, 3)
@@ -225,6 +280,10 @@ VERTICES, TRIANGLES = sphere(1.0, 1)
         (
             "weights",
             lambda: af.sharpen(VERTICES, TRIANGLES, VERTICES, "cube", weights=-np.ones(len(VERTICES))),
+        ),
+        (
+            "contact",
+            lambda: af.sharpen(VERTICES, TRIANGLES, VERTICES, "cube", contact=af.Contact(itself=True)),
         ),
         ("up", lambda: af.sharpen(VERTICES, TRIANGLES, VERTICES, "cube", up=np.zeros(3))),
         (

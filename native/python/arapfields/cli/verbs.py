@@ -79,8 +79,9 @@ def stylize(args):
         except (ValueError, argparse.ArgumentTypeError) as error:
             raise af.InvalidInput(f"--style-turn: expected AXIS as x,y,z and DEGREES ({error})") from error
 
-    if contact is not None and args.option_finish:
-        raise af.InvalidInput("--finish: with contact it might enter an obstacle; --no-finish is needed")
+    itself = contact is not None and contact.itself
+    if itself and args.option_finish:
+        raise af.InvalidInput("--finish: it does not see the surface's other parts; --no-finish is needed")
 
     def solve(samples, handles, task):
         settings = {"handles": handles, "orientation": orientation, "up": up, "contact": contact}
@@ -93,13 +94,13 @@ def stylize(args):
 
         def run(task):
             sharpened = af.SharpenOptions(**shares)
-            further = {"orientation": orientation, **stands, "task": task}
+            further = {"orientation": orientation, **stands, "contact": contact, "task": task}
             return af.sharpen(vertices, triangles, moved, normals, sharpened, **further)
 
         return with_progress("finish", run, args.quiet)
 
     is_mesh = not af.GaussianSplats.is_file(args.input)
-    finishes = given(args, "stylize", "finish") and contact is None and is_mesh
+    finishes = given(args, "stylize", "finish") and not itself and is_mesh
     if finishes and args.option_centers is None:
         options.centers = af.CENTERS_BEFORE_SHARPEN
     _solve(args, solve, options.seed, needs_handles=False, finish=finish if finishes else None)
