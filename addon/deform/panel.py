@@ -8,6 +8,7 @@ from ..handles import empties, symmetry
 from ..live.panel import live_buttons, playback_progress
 from ..names import Op
 from ..results.placement import placement_refusal, replaced_by
+from . import subdividing
 
 
 class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
@@ -30,6 +31,7 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
         )
         if empties.holding_nothing(source):
             note(layout, nothing_held(empties.holding_nothing(source)))
+        subdividing.draw_note(layout, source)
 
 
 class ARAPFIELDS_PT_deform_settings(Advanced, bpy.types.Panel):

@@ -43,10 +43,13 @@ constexpr double least_slide = 0.99;
 constexpr int style_samples_a_center = 8, most_style_samples = 8000;
 /// Centers, samples and iterations of the coarse solve that a stylization starts from.
 constexpr int style_first_centers = 400, style_first_samples = 4000, style_first_steps = 30;
-/// A styled field that folds between the energy samples is solved again, in rounds, with the folded samples
-/// added and the weight of the fold barrier multiplied by `unfolding`.
-constexpr int unfolding_rounds = 5, unfolding_steps = 15;
-constexpr double unfolding = 3.0;
+/// A field that folds between the energy samples is solved again, in rounds, with the folded places added and
+/// the weight of the fold barrier multiplied by `unfolding`; a deformation's is `least_barrier` at least.
+/// Such a one is solved again also where it stretches the mesh more than `most_stretch`, and than the energy
+/// samples by the factor `beyond_samples`.
+constexpr int unfolding_rounds = 5, unfolding_steps = 15, rounds_anew = 3;
+constexpr double unfolding = 3.0, least_barrier = 10.0;
+constexpr double most_stretch = 3.0, beyond_samples = 1.5;
 /// Factor on the weight of exact handles as soft handles of the radial field inside the blend, which no other
 /// term holds within their boxes.
 constexpr double share_of_exact = 0.01;
@@ -182,10 +185,53 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
   return result;
 }
 
+bool was_ended(const LoopResult& loop) {
+  return loop.stopped_by == StopReason::observer || loop.stopped_by == StopReason::time_budget;
+}
+
+/// How a solve goes on where the field folds or stretches between the energy samples.
+struct Unfolding {
+  double barrier = 0.0;  ///< weight of the fold barrier
+  int rounds = 0, steps = 0;
+  bool all_samples = false;  ///< look at all samples; else only where the mesh or the energy samples fold
+  bool stretches = false;    ///< whether stretches count
+  /// Solves anew in `rounds_anew`, without a barrier; empty: goes on from the present shape. Where nothing
+  /// held the field it may be so far off that descent from there is slow, and behind the barrier stuck.
+  std::function<void()> anew = {};
+};
+
+/// Solves in rounds while the field folds or stretches at samples or triangles. Returns the measures of the
+/// samples' mesh in the end.
+std::optional<MeshMeasures> unfold(RadialSolver& solver, const SurfaceSamples& samples,
+                                   const SurfaceOptions& surface, const Unfolding& how, const Shown& shown,
+                                   const Progress& progress) {
+  DistortionLimits limits{surface.barrier_threshold};
+  if (how.stretches)
+    limits.most_stretch = std::max(most_stretch, beyond_samples * solver.report().distortion.max_stretch);
+  std::optional<MeshMeasures> seen;
+  for (int round = 0;; ++round) {
+    const std::shared_ptr<const DeformationField> now = shown();
+    if (samples.mesh) seen = measure_triangles(*now, *samples.mesh, limits);
+    const bool is_wrong = seen && seen->is_wrong;
+    if (round == how.rounds ||
+        !(how.all_samples || is_wrong || solver.report().distortion.flipped_share > 0.0))
+      break;
+    const bool is_anew = round < rounds_anew && how.anew;
+    const MeshPlaces places = is_wrong ? seen->wrong : MeshPlaces();
+    if (solver.add_fold_samples(is_anew ? surface.barrier : how.barrier, *now, places) == 0) break;
+    if (is_anew)
+      how.anew();
+    else
+      solver.solve(how.steps, 0.0, progress);
+  }
+  return seen;
+}
+
 Solution finish(const Shown& shown, const SurfaceSamples& samples, const ObjectiveTerms& terms,
-                LoopResult loop, const RadialReport& solved, const Progress& progress) {
+                LoopResult loop, std::optional<MeshMeasures> of_mesh, const RadialReport& solved,
+                const Progress& progress) {
   progress.report(0.98, "measuring the result");
-  Solution solution = measured(shown(), samples, terms, std::move(loop));
+  Solution solution = measured(shown(), samples, terms, std::move(loop), std::move(of_mesh));
   solution.report.contact = solved.contact;
   solution.report.terms = solved.terms;
   for (LossTerm& term : solution.report.terms) term.value *= terms.rigidity;
@@ -238,11 +284,31 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   const Shown shown = [&] { return around(solver.field()); };
   LoopResult loop =
       run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0, shown, {.least_gain = least_gain});
+  SolveHooks unseen = hooks;
+  unseen.observer = nullptr;
+  solver.set_hooks({hooks.energies, 1.0, {}, hooks.terms});
+  Unfolding how{unfolding * std::max(options.surface.barrier, least_barrier)};
+  how.rounds = was_ended(loop) || hooks.contact ? 0 : unfolding_rounds;
+  how.steps = std::min(unfolding_steps, options.training.iterations);
+  how.stretches = true;
+  how.anew = [&] {
+    solver.reset();
+    solver.set_targets(handles);
+    if (first) solver.adopt(*first);
+    const LoopResult again = run(solver, options.training, progress.part(0.95, 0.97), unseen, 1.0, shown,
+                                 {.least_gain = least_gain});
+    for (const auto& [iterations, value] : again.history)
+      loop.history.emplace_back(loop.iterations + iterations, value);
+    loop.iterations += again.iterations;
+    loop.seconds += again.seconds;
+  };
+  std::optional<MeshMeasures> of_mesh =
+      unfold(solver, samples, options.surface, how, shown, progress.part(0.97, 0.98));
   ObjectiveTerms terms;
   terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.weights = energy_weights(samples, terms.handles);
-  return finish(shown, samples, terms, std::move(loop), solver.report(), progress);
+  return finish(shown, samples, terms, std::move(loop), std::move(of_mesh), solver.report(), progress);
 }
 
 DeformOptions followed_closely(DeformOptions options) {
@@ -301,18 +367,19 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity,
                               shown, {.worst = worst, .least_gain = least_style_gain});
   solver.set_hooks({hooks.energies, 1.0 / options.rigidity, {}, hooks.terms});
-  const bool ended = loop.stopped_by == StopReason::observer || loop.stopped_by == StopReason::time_budget;
-  for (int round = 0; round < unfolding_rounds && options.surface.barrier > 0.0 && !ended; ++round) {
-    if (solver.add_fold_samples(unfolding * live.surface.barrier) == 0) break;
-    solver.solve(std::min(unfolding_steps, options.training.iterations), 0.0, progress.part(0.95, 0.98));
-  }
+  Unfolding how{unfolding * live.surface.barrier};
+  how.rounds = options.surface.barrier > 0.0 && !was_ended(loop) ? unfolding_rounds : 0;
+  how.steps = std::min(unfolding_steps, options.training.iterations);
+  how.all_samples = true;
+  std::optional<MeshMeasures> of_mesh =
+      unfold(solver, samples, options.surface, how, shown, progress.part(0.95, 0.98));
   ObjectiveTerms terms;
   terms.rigidity = options.rigidity;
   terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
   terms.style = StyleAtSamples::of(style, samples.normals, options.sharpness);
   terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
   terms.weights = energy_weights(samples, terms.handles);
-  return finish(shown, samples, terms, loop, solver.report(), progress);
+  return finish(shown, samples, terms, loop, std::move(of_mesh), solver.report(), progress);
 }
 
 }  // namespace arapfields
