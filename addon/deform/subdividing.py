@@ -67,7 +67,9 @@ def divide(source, limit):
             if wide:
                 bmesh.ops.triangulate(shape, faces=list(wide))
                 long = [edge for edge in shape.edges if edge.calc_length() > limit]
-            bmesh.ops.subdivide_edges(shape, edges=long, cuts=1, use_grid_fill=True)
+            made = bmesh.ops.subdivide_edges(shape, edges=long, cuts=1, use_grid_fill=True)["geom"]
+            wide = [one for one in made if isinstance(one, bmesh.types.BMFace) and len(one.verts) > 4]
+            bmesh.ops.triangulate(shape, faces=wide)
         shape.to_mesh(source.data)
     finally:
         shape.free()
