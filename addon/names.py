@@ -53,6 +53,7 @@ class Op(StrEnum):
     DELETE_LEFT = "arapfields.delete_left"
     RESIZE_HANDLE = "arapfields.resize_handle"
     DEFORM = "arapfields.deform"
+    SUBDIVIDE = "arapfields.subdivide"
     EXTRACT = "arapfields.extract"
     STYLIZE = "arapfields.stylize"
     SET_STYLE = "arapfields.set_style"

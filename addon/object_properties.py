@@ -77,6 +77,9 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
         "Armatures Switched Off",
         "Armature modifiers that the field replaces, and whether they were on, as JSON",
     )
+    long_triangles: integer(
+        "Long Triangles", "Triangles that are too long for the last deformation, and turn over"
+    )
     moved_by: text("Moved By", "DEFORM, STYLIZE, POSED or WRAP: what the field's motion comes from")
     under_rig: flag(
         "Before Armatures", "Whether the field works on the shape at rest, which armatures pose afterwards"

@@ -18,7 +18,7 @@ CONTENTS = [  # modules with CLASSES
     # features
     *("tasks.panel", "surface.operators", "surface.panel"),
     *("handles.operators", "handles.resizing", "handles.left_behind", "handles.panel"),
-    *("deform.operators", "deform.panel"),
+    *("deform.operators", "deform.subdividing", "deform.panel"),
     *("stylize.operators", "stylize.panel"),
     *("wrap.operators", "wrap.clicking", "wrap.suggesting", "wrap.refitting", "wrap.sheet", "wrap.panel"),
     *("skin.operators", "skin.panel"),

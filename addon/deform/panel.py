@@ -7,6 +7,7 @@ from ..core.settings.parameters import DEFORM
 from ..handles import empties, symmetry
 from ..live.panel import playback_progress, pose_button, result_row
 from ..results.placement import placement_refusal, replaced_by
+from . import subdividing
 
 
 class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
@@ -29,6 +30,7 @@ class ARAPFIELDS_PT_deform(Section, bpy.types.Panel):
         )
         if empties.holding_nothing(source):
             note(layout, nothing_held(empties.holding_nothing(source)))
+        subdividing.draw_note(layout, source)
 
 
 class ARAPFIELDS_PT_deform_settings(Advanced, bpy.types.Panel):

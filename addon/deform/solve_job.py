@@ -104,6 +104,8 @@ def plan_solve_job(
         if preview is not None:
             preview.hand_over()
         owner = surface.reference.get()
+        if kind == "DEFORM":
+            settings_of(owner).long_triangles = solved.report.get("turned_triangles", 0)
         if result != "NEW":
             operator.ways = tuple(one for one in operator.ways if one[0].uid != surface.reference.uid)
         item = placement.place_result(bpy.context, owner, kind, output, result, solved, placed.local)

@@ -37,8 +37,9 @@ py::object solve_report(const SolveReport& report, double scale) {
                      "seconds"_a = report.loop.seconds, "stopped_by"_a = name_of(report.loop.stopped_by),
                      "scale"_a = scale, "loss"_a = py::tuple(loss),
                      "notes"_a = py::tuple(py::cast(report.warnings)), "preference"_a = report.preference,
-                     "far_target"_a = report.far_target, "contact"_a = contact_report(report.contact),
-                     "terms"_a = terms_of(report.terms), **field_measures(report.arap, report.distortion));
+                     "far_target"_a = report.far_target, "turned_triangles"_a = report.turned_triangles,
+                     "contact"_a = contact_report(report.contact), "terms"_a = terms_of(report.terms),
+                     **field_measures(report.arap, report.distortion));
 }
 
 py::object solved(const Solution& solution) {

@@ -6,7 +6,7 @@
 #include "core/task.h"
 #include "energies/style.h"
 #include "options/sharpen.h"
-#include "solve/contact.h"
+#include "solve/contact/contact.h"
 
 namespace arapfields {
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/mesh_measures.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -15,9 +16,10 @@ namespace {
 constexpr double long_edge = 3.0;
 /// Edges that stay shorter than this, in diagonals of the mesh, are not seen.
 constexpr double least_edge = 1e-3;
-/// Share of the measured triangles up to which folded or turned ones are not told of: slivers turn at a
-/// touch.
-constexpr double few_turned = 0.002;
+
+/// J is looked at near the corners of triangles with an edge that becomes longer or shorter than this, as a
+/// factor; at the corners themselves other parts of the surface may touch.
+constexpr double changed_edge = 1.5, towards_middle = 0.02;
 
 Vec3 corner(const Points& vertices, const Triangles& triangles, Index t, int k) {
   return vertices.row(triangles(t, k % 3)).transpose();
@@ -74,9 +76,53 @@ std::string number_of(const char* format, double value) {
   return text;
 }
 
+Mat3 jacobian_at(const JetView<double>& jets, Index row) {
+  Mat3 result;
+  for (int k = 0; k < 3; ++k) result.col(k) = Eigen::Map<const Vec3>(jets.at(first_column(k), row));
+  return result;
+}
+
+/// Whether the largest singular value is above `most`.
+bool stretches_beyond(const Mat3& jacobian, double most) {
+  if (!(jacobian.squaredNorm() > most * most)) return false;  // which is at least as large
+  Eigen::SelfAdjointEigenSolver<Mat3> squares;
+  squares.computeDirect(jacobian.transpose() * jacobian, Eigen::EigenvaluesOnly);
+  return squares.eigenvalues()[2] > most * most;
+}
+
+/// Collects places beyond limits.
+class WrongPlaces {
+ public:
+  explicit WrongPlaces(const DistortionLimits& limits) : limits_(limits) {}
+  void look_at(const Mat3& jacobian, const Vec3& place, const Vec3& normal) {
+    const double determinant = jacobian.determinant();
+    const bool stretched = stretches_beyond(jacobian, limits_.most_stretch);
+    is_wrong_ |= stretched || !(determinant > 0.0);
+    if ((stretched || !(determinant >= limits_.least_determinant)) && normal.norm() > 0.0)
+      places_.emplace_back(place, normal.normalized());
+  }
+  /// Evenly chosen ones, where there are more than may be.
+  void move_to(MeshMeasures& result) const {
+    const Index found = std::ssize(places_), count = std::min(found, MeshMeasures::most_wrong);
+    result.is_wrong = is_wrong_;
+    result.wrong = {Points(count, 3), Points(count, 3)};
+    for (Index i = 0; i < count; ++i) {
+      const auto& [place, normal] = places_[static_cast<std::size_t>(i * found / count)];
+      result.wrong.points.row(i) = place.transpose();
+      result.wrong.normals.row(i) = normal.transpose();
+    }
+  }
+
+ private:
+  DistortionLimits limits_;
+  bool is_wrong_ = false;
+  std::vector<std::pair<Vec3, Vec3>> places_;
+};
+
 }  // namespace
 
-MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh& mesh) {
+MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh& mesh,
+                               const DistortionLimits& limits) {
   MeshMeasures result;
   const std::vector<Index> rows = largest(mesh, MeshMeasures::most_measured);
   const bool whole = std::ssize(rows) == mesh.triangles.rows();
@@ -96,8 +142,11 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
   result.measured = count;
   result.distortion = distortion<double>(JetView<const double>(jets.view()));
   const double diagonal = diagonal_of(mesh.vertices);
-  double area = 0.0, turned_area = 0.0, largest_turned = 0.0;
+  double area = 0.0, turned_area = 0.0, largest_turned = 0.0, smallest = 0.0;
+  WrongPlaces wrong(limits);
+  std::vector<Index> changed;
   for (Index t = 0; t < count; ++t) {
+    bool changes = false;
     Vec3 rest[3], now[3];
     for (int k = 0; k < 3; ++k) {
       rest[k] = corner(looked.vertices, looked.triangles, t, k);
@@ -106,6 +155,7 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
     for (int k = 0; k < 3; ++k) {
       const Vec3 edge = rest[(k + 1) % 3] - rest[k];
       const double ratio = (now[(k + 1) % 3] - now[k]).norm() / edge.norm();
+      changes |= ratio > changed_edge || ratio < 1.0 / changed_edge;
       if (std::isfinite(ratio) && ratio > result.longest_edge &&
           (now[(k + 1) % 3] - now[k]).norm() > least_edge * diagonal) {
         result.longest_edge = ratio;
@@ -115,11 +165,15 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
     const Vec3 before = 0.5 * (rest[1] - rest[0]).cross(rest[2] - rest[0]);
     const Vec3 after = 0.5 * (now[1] - now[0]).cross(now[2] - now[0]);
     area += before.norm();
-    Mat3 jacobian;
-    for (int k = 0; k < 3; ++k) jacobian.col(k) = Eigen::Map<const Vec3>(jets.view().at(first_column(k), t));
+    if (changes) changed.push_back(t);
+    const Mat3 jacobian = jacobian_at(jets.view(), t);
+    wrong.look_at(jacobian, middles.row(t).transpose(), before);
     const double determinant = jacobian.determinant();
     if (!(determinant > 0.0)) {
-      ++result.folded;
+      if (result.folded++ == 0 || determinant < smallest) {
+        smallest = determinant;
+        result.folded_place = middles.row(t).transpose();
+      }
       continue;
     }
     // Normals move by the cofactors of J.
@@ -132,15 +186,38 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
     }
   }
   if (area > 0.0) result.turned_share = turned_area / area;
+  if (!changed.empty()) {
+    Points corners(3 * std::ssize(changed), 3);
+    for (Index i = 0; i < corners.rows(); ++i) {
+      const Index t = changed[static_cast<std::size_t>(i / 3)];
+      const Vec3 place = corner(looked.vertices, looked.triangles, t, static_cast<int>(i % 3));
+      corners.row(i) = (1.0 - towards_middle) * place.transpose() + towards_middle * middles.row(t);
+    }
+    JetBlock<double> at_corners(corners.rows(), JetOrder::first);
+    field.evaluate(field.frame().to_cube(corners), at_corners.view());
+    const Distortion there = distortion<double>(JetView<const double>(at_corners.view()));
+    result.distortion.min_determinant = std::min(result.distortion.min_determinant, there.min_determinant);
+    result.distortion.max_stretch = std::max(result.distortion.max_stretch, there.max_stretch);
+    result.distortion.min_stretch = std::min(result.distortion.min_stretch, there.min_stretch);
+    for (Index i = 0; i < corners.rows(); ++i) {
+      const Index t = changed[static_cast<std::size_t>(i / 3)];
+      const Vec3 first = corner(looked.vertices, looked.triangles, t, 0);
+      wrong.look_at(jacobian_at(at_corners.view(), i), corners.row(i).transpose(),
+                    (corner(looked.vertices, looked.triangles, t, 1) - first)
+                        .cross(corner(looked.vertices, looked.triangles, t, 2) - first));
+    }
+  }
+  wrong.move_to(result);
   return result;
 }
 
 std::vector<std::string> warnings_on(const MeshMeasures& measures) {
   std::vector<std::string> warnings;
-  if (static_cast<double>(measures.folded) > few_turned * static_cast<double>(measures.measured))
+  if (measures.folded > 0)
     warnings.push_back("the field folds at the middles of " + std::to_string(measures.folded) + " of " +
-                       std::to_string(measures.measured) + " triangles");
-  if (static_cast<double>(measures.turned) > few_turned * static_cast<double>(measures.measured))
+                       std::to_string(measures.measured) + " triangles, the worst at " +
+                       place_text(measures.folded_place));
+  if (measures.has_long_triangles())
     warnings.push_back(std::to_string(measures.turned) + " of " + std::to_string(measures.measured) +
                        " triangles turn over (" + number_of("%.2g", 100.0 * measures.turned_share) +
                        " % of the area), the largest at " + place_text(measures.turned_place) +

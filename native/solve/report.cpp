@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "solve/field_measures.h"
-#include "solve/mesh_measures.h"
 #include "solve/setup.h"
 #include "solve/warnings.h"
 
@@ -97,19 +96,19 @@ FieldMeasures measure_at(const DeformationField& field, PointsIn points) {
 }
 
 Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples& samples,
-                  const ObjectiveTerms& terms, LoopResult loop) {
+                  const ObjectiveTerms& terms, LoopResult loop, std::optional<MeshMeasures> of_mesh) {
   Solution solution{std::move(field), {}};
   solution.report = measure(*solution.field, samples, terms);
   const std::optional<FarTarget> far = far_target(terms.handles, samples.points);
   if (far) solution.report.far_target = far->sizes;
-  std::vector<std::string> of_mesh;
-  if (samples.mesh) {
-    const MeshMeasures mesh = measure_triangles(*solution.field, *samples.mesh);
-    merge(solution.report.distortion, mesh.distortion);
-    of_mesh = warnings_on(mesh);
+  if (!of_mesh && samples.mesh) of_mesh = measure_triangles(*solution.field, *samples.mesh);
+  if (of_mesh) {
+    merge(solution.report.distortion, of_mesh->distortion);
+    solution.report.turned_triangles = of_mesh->has_long_triangles() ? of_mesh->turned : 0;
   }
   solution.report.warnings = warnings_on(solution.report.distortion, far, terms.handles);
-  for (std::string& warning : of_mesh) solution.report.warnings.push_back(std::move(warning));
+  if (of_mesh)
+    for (std::string& warning : warnings_on(*of_mesh)) solution.report.warnings.push_back(std::move(warning));
   solution.report.loop = std::move(loop);
   return solution;
 }

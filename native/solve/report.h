@@ -3,7 +3,9 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 
+#include "solve/mesh_measures.h"
 #include "solve/solution.h"
 #include "solve/trained/field_objective.h"
 
@@ -14,9 +16,10 @@ namespace arapfields {
 SolveReport measure(const DeformationField& field, const SurfaceSamples& samples, const ObjectiveTerms& terms,
                     Index max_samples = 4000);
 
-/// A field that another solver made, with its report and warnings.
+/// A field that another solver made, with its report and warnings. `of_mesh`: measure_triangles() of the
+/// samples' mesh, where they are known.
 Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples& samples,
-                  const ObjectiveTerms& terms, LoopResult loop);
+                  const ObjectiveTerms& terms, LoopResult loop, std::optional<MeshMeasures> of_mesh = {});
 
 /// Makes the objective to minimise out of solve_field's own, for terms that it does not know.
 using WrapObjective = std::function<std::unique_ptr<Objective>(Objective& inner)>;

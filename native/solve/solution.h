@@ -26,6 +26,9 @@ struct SolveReport {
   std::optional<double> preference;  ///< mean g(ñ) of the deformed normals, or mean ñ·T(n) (object's style)
   Distortion distortion;
   ContactReport contact;
+  /// Triangles of the mesh that turn over where the field does not fold: they are too long for the motion;
+  /// 0 where they are too few to tell of.
+  Index turned_triangles = 0;
   LoopResult loop;
   std::vector<std::string> warnings;  ///< sentences: folds, far targets, margins that were reduced
 };

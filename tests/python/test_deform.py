@@ -416,3 +416,44 @@ def test_the_other_fingers_stay(data_dir, seed):
     report = field.report
     assert report.handle_error_max < 0.01 * length and report.flipped_share == 0.0
     assert report.energy < 0.005
+
+
+def with_ears(width):
+    """A bar along x with three ears on top, narrow cones on which few samples lie."""
+    bar = trimesh.creation.box((2.0, 0.4, 0.4))
+    for _ in range(4):
+        bar = bar.subdivide()
+    vertices, triangles = np.array(bar.vertices), np.array(bar.faces)
+    turns, rows = np.linspace(0, 2 * np.pi, 8, endpoint=False), 12
+    for x in (-0.3, 0.0, 0.3):
+        rings = [
+            (x + r * np.cos(a), r * np.sin(a), 0.19 + 0.9 * i / rows)
+            for i in range(rows)
+            for r in [width * (1 - i / rows)]
+            for a in turns
+        ]
+        start, last = len(vertices), 8 * rows
+        faces = [(last - 8 + j, last - 8 + (j + 1) % 8, last) for j in range(8)]
+        for i in range(0, last - 8, 8):
+            for j in range(8):
+                a, b = i + j, i + (j + 1) % 8
+                faces += [(a, b, b + 8), (a, b + 8, a + 8)]
+        vertices = np.vstack([vertices, rings, (x, 0.0, 1.09)])
+        triangles = np.vstack([triangles, start + np.array(faces)])
+    return vertices, triangles
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_no_place_of_the_mesh_is_free_to_fold_between_samples(seed):
+    # Ears grew spikes of up to nineteen times their length, det J −114.
+    vertices, triangles = with_ears(0.03)
+    ends = [
+        cases.moved(cases.box([-1.1, -1, -1], [-0.8, 1, 1])),
+        cases.moved(cases.box([0.8, -1, -1], [1.1, 1, 1]), cases.turn([0, 1, 0], -80, (0, 0, 0))),
+    ]
+    field = af.deform(af.sample_mesh(vertices, triangles, 2000, seed=seed), ends)
+    stretches = np.linalg.svd(field.jacobian(vertices[triangles].mean(axis=1)), compute_uv=False)
+    assert np.linalg.det(field.jacobian(vertices[triangles].mean(axis=1))).min() > 0
+    assert field.report.min_determinant > 0 and field.report.flipped_share == 0
+    assert stretches.max() <= field.report.max_stretch + 1e-9 < 3.0  # above, the solve would go on
+    assert not [note for note in field.report.notes if "fold" in note]

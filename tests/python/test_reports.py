@@ -272,3 +272,5 @@ def test_triangles_too_long_for_the_motion_are_located():
     told = [note for note in field.report.notes if "turn over" in note]
     assert turned.sum() > 0.002 * len(mesh_triangles)
     assert told[0].startswith(f"{turned.sum()} of {len(mesh_triangles)} triangles turn over")
+    assert field.report.turned_triangles == turned.sum() and field.report.to_dict()["turned_triangles"] > 0
+    assert bent(*strips(40), 60.0).report.turned_triangles == 0

@@ -67,7 +67,7 @@ void RadialSolver::adopt(const DeformationField& field, const ContactReport& con
   s.contact.begin(s.problem.basis.identity());  // the other field may have crossed a sheet
 }
 
-Index RadialSolver::add_fold_samples(double barrier) {
+Index RadialSolver::add_fold_samples(double barrier, const DeformationField& now, const MeshPlaces& places) {
   RadialState& s = *state_;
   const ThreadScope threads(s.problem.options.threads);
   const std::vector<Index>& chosen = s.problem.energy_samples;
@@ -80,7 +80,7 @@ Index RadialSolver::add_fold_samples(double barrier) {
   // Those at which the field folds, or nearly does.
   const Index count = static_cast<Index>(unseen.size());
   JetBlock<double> jets(count, JetOrder::first);
-  field()->evaluate(rows_of(s.problem.surface(), unseen), jets.view());
+  now.evaluate(rows_of(s.problem.surface(), unseen), jets.view());
   Index folded = 0;
   std::vector<Index> added;
   for (Index p = 0; p < count; ++p) {
@@ -92,11 +92,20 @@ Index RadialSolver::add_fold_samples(double barrier) {
       added.push_back(unseen[static_cast<std::size_t>(p)]);
   }
   const double seen_folds = s.report.distortion.flipped_share * static_cast<double>(chosen.size());
-  folded += static_cast<Index>(std::ceil(seen_folds));
+  folded += static_cast<Index>(std::ceil(seen_folds)) + places.points.rows();
   if (folded == 0) return 0;
   s.problem.options.surface.barrier = barrier;
+  if (places.points.rows() > 0) {
+    const Index before = s.problem.samples.size();
+    s.style.repeat(s.problem.add_samples(places));
+    for (Index row = before; row < s.problem.samples.size(); ++row) added.push_back(row);
+    if (s.handles.any()) s.handles.set(std::vector<Handle>(handles()));  // which may hold some of them
+  }
   s.problem.add_energy_samples(added);
-  s.stiffness.add_samples(s.handles.bound());
+  if (places.points.rows() > 0)  // where hardly anything held the field
+    s.stiffness.update(s.handles.bound());
+  else
+    s.stiffness.add_samples(s.handles.bound());
   return folded;
 }
 

@@ -68,10 +68,14 @@ struct FullSolve {
   static constexpr double style_radius = 3.0;
   /// Least weight of handles in a style: one of none would leave the shape free.
   static constexpr double least_handle_weight = 1e-3;
-  /// A styled field that folds between the energy samples is solved again, in rounds of so many iterations,
-  /// with the folded samples added and the weight of the fold barrier multiplied by a factor.
-  static constexpr int unfolding_rounds = 5, unfolding_iterations = 15;
-  static constexpr double unfolding = 3.0;
+  /// A field that folds between the energy samples is solved again, in rounds of so many iterations, with the
+  /// folded places added and the weight of the fold barrier multiplied by a factor; a deformation's is the
+  /// least one at least, and its first rounds start anew.
+  static constexpr int unfolding_rounds = 5, unfolding_iterations = 15, rounds_anew = 3;
+  static constexpr double unfolding = 3.0, least_barrier = 10.0;
+  /// A deformation goes on also where it stretches the mesh more than the first, and than the energy samples
+  /// by the second factor: these are not seen there.
+  static constexpr double most_stretch = 3.0, beyond_samples = 1.5;
 };
 
 template <class Options>
@@ -207,10 +211,54 @@ ObjectiveTerms measured_terms(const SurfaceSamples& samples, const std::vector<H
   return terms;
 }
 
+bool was_ended(const LoopResult& loop) {
+  return loop.stopped_by == StopReason::observer || loop.stopped_by == StopReason::time_budget;
+}
+
+/// How a solve goes on where the field folds or stretches between the energy samples.
+struct Unfolding {
+  double barrier = 0.0;  ///< weight of the fold barrier
+  int rounds = 0, steps = 0;
+  bool all_samples = false;  ///< look at all samples; else only where the mesh or the energy samples fold
+  bool stretches = false;    ///< whether stretches count
+  /// Solves anew in `rounds_anew`, without a barrier; empty: goes on from the present shape. Where nothing
+  /// held the field it may be so far off that descent from there is slow, and behind the barrier stuck.
+  std::function<void()> anew = {};
+};
+
+/// Solves in rounds while the field folds or stretches at samples or triangles. Returns the measures of the
+/// samples' mesh in the end.
+std::optional<MeshMeasures> unfold(RadialSolver& solver, const SurfaceSamples& samples,
+                                   const SurfaceOptions& surface, const Unfolding& how, const Shown& shown,
+                                   const Progress& progress) {
+  DistortionLimits limits{surface.barrier_threshold};
+  if (how.stretches)
+    limits.most_stretch =
+        std::max(FullSolve::most_stretch, FullSolve::beyond_samples * solver.report().distortion.max_stretch);
+  std::optional<MeshMeasures> seen;
+  for (int round = 0;; ++round) {
+    const std::shared_ptr<const DeformationField> now = shown();
+    if (samples.mesh) seen = measure_triangles(*now, *samples.mesh, limits);
+    const bool is_wrong = seen && seen->is_wrong;
+    if (round == how.rounds ||
+        !(how.all_samples || is_wrong || solver.report().distortion.flipped_share > 0.0))
+      break;
+    const bool is_anew = round < FullSolve::rounds_anew && how.anew;
+    const MeshPlaces places = is_wrong ? seen->wrong : MeshPlaces();
+    if (solver.add_fold_samples(is_anew ? surface.barrier : how.barrier, *now, places) == 0) break;
+    if (is_anew)
+      how.anew();
+    else
+      solver.solve(how.steps, 0.0, progress);
+  }
+  return seen;
+}
+
 Solution finish(const Shown& shown, const SurfaceSamples& samples, const ObjectiveTerms& terms,
-                LoopResult loop, const RadialReport& solved, const Progress& progress) {
+                LoopResult loop, std::optional<MeshMeasures> of_mesh, const RadialReport& solved,
+                const Progress& progress) {
   progress.report(0.98, "measuring the result");
-  Solution solution = measured(shown(), samples, terms, std::move(loop));
+  Solution solution = measured(shown(), samples, terms, std::move(loop), std::move(of_mesh));
   solution.report.contact = solved.contact;
   solution.report.terms = solved.terms;
   for (LossTerm& term : solution.report.terms) term.value *= terms.rigidity;
@@ -265,8 +313,28 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   const Shown shown = [&] { return around(solver.field()); };
   LoopResult loop = run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0, shown,
                         {.least_gain = FullSolve::least_gain});
+  SolveHooks unseen = hooks;
+  unseen.observer = nullptr;
+  solver.set_hooks({hooks.energies, 1.0, {}, hooks.terms});
+  Unfolding how{FullSolve::unfolding * std::max(options.surface.barrier, FullSolve::least_barrier)};
+  how.rounds = was_ended(loop) || hooks.contact ? 0 : FullSolve::unfolding_rounds;
+  how.steps = std::min(FullSolve::unfolding_iterations, options.training.iterations);
+  how.stretches = true;
+  how.anew = [&] {
+    solver.reset();
+    solver.set_targets(handles);
+    if (first) solver.adopt(*first);
+    const LoopResult again = run(solver, options.training, progress.part(0.95, 0.97), unseen, 1.0, shown,
+                                 {.least_gain = FullSolve::least_gain});
+    for (const auto& [iterations, value] : again.history)
+      loop.history.emplace_back(loop.iterations + iterations, value);
+    loop.iterations += again.iterations;
+    loop.seconds += again.seconds;
+  };
+  std::optional<MeshMeasures> of_mesh =
+      unfold(solver, samples, options.surface, how, shown, progress.part(0.97, 0.98));
   const ObjectiveTerms terms = measured_terms(samples, handles, *shape, options.surface);
-  return finish(shown, samples, terms, std::move(loop), solver.report(), progress);
+  return finish(shown, samples, terms, std::move(loop), std::move(of_mesh), solver.report(), progress);
 }
 
 DeformOptions followed_closely(DeformOptions options) {
@@ -326,17 +394,16 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity,
                               shown, {.worst = worst, .least_gain = FullSolve::least_style_gain});
   solver.set_hooks({hooks.energies, 1.0 / options.rigidity, {}, hooks.terms});
-  const bool ended = loop.stopped_by == StopReason::observer || loop.stopped_by == StopReason::time_budget;
-  for (int round = 0; round < FullSolve::unfolding_rounds && options.surface.barrier > 0.0 && !ended;
-       ++round) {
-    if (solver.add_fold_samples(FullSolve::unfolding * live.surface.barrier) == 0) break;
-    solver.solve(std::min(FullSolve::unfolding_iterations, options.training.iterations), 0.0,
-                 progress.part(0.95, 0.98));
-  }
+  Unfolding how{FullSolve::unfolding * live.surface.barrier};
+  how.rounds = options.surface.barrier > 0.0 && !was_ended(loop) ? FullSolve::unfolding_rounds : 0;
+  how.steps = std::min(FullSolve::unfolding_iterations, options.training.iterations);
+  how.all_samples = true;
+  std::optional<MeshMeasures> of_mesh =
+      unfold(solver, samples, options.surface, how, shown, progress.part(0.95, 0.98));
   ObjectiveTerms terms = measured_terms(samples, handles, *shape, options.surface);
   terms.rigidity = options.rigidity;
   terms.style = StyleAtSamples::of(style, samples.normals, options.sharpness);
-  return finish(shown, samples, terms, loop, solver.report(), progress);
+  return finish(shown, samples, terms, loop, std::move(of_mesh), solver.report(), progress);
 }
 
 }  // namespace arapfields

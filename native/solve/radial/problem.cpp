@@ -2,6 +2,7 @@
 #include "solve/radial/problem.h"
 
 #include "core/random.h"
+#include "sampling/nearest_sample.h"
 #include "sampling/sample_choice.h"
 #include "solve/setup.h"
 
@@ -15,6 +16,8 @@ constexpr Index worth_threads = 1000000;
 /// functions are wider than the distance of the layers and nearly dependent: solves take 1.5 times as many
 /// iterations.
 constexpr int worth_two_layers = 400;
+/// A place of the mesh that is no farther from a sample, in cube units, is that sample.
+constexpr double same_place = 1e-9;
 
 }  // namespace
 
@@ -56,6 +59,41 @@ void RadialProblem::add_energy_samples(const std::vector<Index>& rows) {
   energy_samples.insert(energy_samples.end(), rows.begin(), rows.end());
   energy_points = rows_of(surface(), energy_samples);
   ++energy_revision;
+}
+
+std::vector<Index> RadialProblem::add_samples(const MeshPlaces& places) {
+  const auto found = nearest_samples(samples.points).closest(frame().to_cube(places.points));
+  std::vector<Index> rows, nearest;
+  for (Index i = 0; i < places.points.rows(); ++i) {
+    if (found.distances[i] < same_place) continue;
+    rows.push_back(i);
+    nearest.push_back(found.triangles[static_cast<std::size_t>(i)]);
+  }
+  const Points points = frame().to_cube(rows_of(places.points, rows));
+  const Points normals = rows_of(places.normals, rows);
+  const Index before = samples.size(), count = before + points.rows();
+  const auto repeat = [&](auto& values) {
+    if (values.size() == 0) return;
+    values.conservativeResize(count);
+    for (Index i = before; i < count; ++i) values[i] = values[nearest[static_cast<std::size_t>(i - before)]];
+  };
+  samples.points.conservativeResize(count, Eigen::NoChange);
+  samples.points.bottomRows(points.rows()) = points;
+  if (samples.normals.rows() > 0) {
+    samples.normals.conservativeResize(count, Eigen::NoChange);
+    for (Index i = before; i < count; ++i) {  // faces may point inwards, samples' normals do not
+      const auto near = samples.normals.row(nearest[static_cast<std::size_t>(i - before)]);
+      const auto own = normals.row(i - before);
+      samples.normals.row(i) = (own.dot(near) < 0.0 ? -1.0 : 1.0) * own;
+    }
+  }
+  repeat(samples.weights);
+  repeat(samples.bend_weights);
+  repeat(samples.sheet_sizes);
+  if (!samples.mesh_indices.empty())
+    for (const Index row : nearest)
+      samples.mesh_indices.push_back(samples.mesh_indices[static_cast<std::size_t>(row)]);
+  return nearest;
 }
 
 int RadialProblem::solve_threads() const {

@@ -12,6 +12,7 @@
 #include "fields/radial_basis.h"
 #include "mesh/surface_samples.h"
 #include "options/live.h"
+#include "solve/mesh_measures.h"
 #include "solve/radial/rest_shape.h"
 #include "solve/surface_stiffness.h"
 
@@ -28,6 +29,9 @@ struct RadialProblem {
   const Points& surface() const { return samples.points; }
   const Frame& frame() const { return samples.frame; }
   void add_energy_samples(const std::vector<Index>& rows);
+  /// Adds samples at places of the mesh where none is. Returns the sample nearest to each, whose weights it
+  /// has.
+  std::vector<Index> add_samples(const MeshPlaces& places);
   /// Threads of a solve; 1 for a small problem.
   int solve_threads() const;
 

@@ -10,6 +10,7 @@
 #include "mesh/surface_samples.h"
 #include "options/live.h"
 #include "solve/contact/contact.h"
+#include "solve/mesh_measures.h"
 #include "solve/radial/hooks.h"
 #include "solve/radial/report.h"
 #include "solve/radial/secondary_motion.h"
@@ -80,9 +81,10 @@ class ARAPFIELDS_EXPORT RadialSolver {
   /// that found it, whose trials are not repeated.
   void adopt(const DeformationField& field, const ContactReport& contact = {});
 
-  /// The number of samples at which the field folds. If there are any, these and the nearly folded ones join
-  /// the samples of the energy, and the fold barrier gets this weight.
-  Index add_fold_samples(double barrier);
+  /// The number of samples at which this field, the current one, folds, and of `places` of the mesh. If there
+  /// are any, the places, these samples and the nearly folded ones join the samples of the energy, and the
+  /// fold barrier gets this weight. Weights of samples cannot be set any more after places have joined.
+  Index add_fold_samples(double barrier, const DeformationField& now, const MeshPlaces& places = {});
 
   /// Points (n,3) in mesh coordinates at which tracked() evaluates the field, with precomputed basis values.
   /// `triangles` are those of the mesh whose vertices the points are; null: not known.

@@ -208,9 +208,8 @@ RowMatrix<double> inverse_factor(RowMatrix<double> stiffness, const RowMatrix<do
 void StiffnessTerms::update(const BoundHandles& handles, const Progress& progress) {
   const Vector weights_before = weights_, bending_before = bending_;
   add_samples(handles);
-  if (revision_ > 0 && weights_.size() == weights_before.size() && weights_ == weights_before &&
-      bending_ == bending_before)
-    return;
+  const auto is_same = [](const Vector& a, const Vector& b) { return a.size() == b.size() && a == b; };
+  if (revision_ > 0 && is_same(weights_, weights_before) && is_same(bending_, bending_before)) return;
   matrix_ = stiffness_matrix(problem_.basis, problem_.energy_points, bending_, weights_, progress,
                              problem_.blend.get());
   if (problem_.mirror) problem_.mirror->symmetrise_matrix(matrix_);

@@ -32,6 +32,13 @@ void StyleTerms::clear() {
   ++revision_;
 }
 
+void StyleTerms::repeat(const std::vector<Index>& rows) {
+  if (!request_ || request_->weights.size() == 0) return;
+  const Vector added = entries_of(request_->weights, rows);
+  request_->weights.conservativeResize(request_->weights.size() + added.size());
+  request_->weights.tail(added.size()) = added;
+}
+
 const std::optional<WeightedStyle>& StyleTerms::style() {
   return style_.get({problem_.energy_revision, revision_},
                     [&] { return any() ? std::optional(at_samples(*request_)) : std::nullopt; });
