@@ -50,6 +50,9 @@ constexpr int style_first_centers = 400, style_first_samples = 4000, style_first
 constexpr int unfolding_rounds = 5, unfolding_steps = 15, rounds_anew = 3;
 constexpr double unfolding = 3.0, least_barrier = 10.0;
 constexpr double most_stretch = 3.0, beyond_samples = 1.5;
+/// A solve anew is not kept if the samples' energy is so many times that of before: at places where parts
+/// touch and come apart, what the field stretches is no surface.
+constexpr double dearer = 3.0;
 /// Factor on the weight of exact handles as soft handles of the radial field inside the blend, which no other
 /// term holds within their boxes.
 constexpr double share_of_exact = 0.01;
@@ -195,9 +198,10 @@ struct Unfolding {
   int rounds = 0, steps = 0;
   bool all_samples = false;  ///< look at all samples; else only where the mesh or the energy samples fold
   bool stretches = false;    ///< whether stretches count
-  /// Solves anew in `rounds_anew`, without a barrier; empty: goes on from the present shape. Where nothing
-  /// held the field it may be so far off that descent from there is slow, and behind the barrier stuck.
-  std::function<void()> anew = {};
+  /// Solves anew in `rounds_anew`, without a barrier, and returns whether that is to be kept; empty: goes on
+  /// from the present shape. Where nothing held the field it may be so far off that descent from there is
+  /// slow, and behind the barrier stuck.
+  std::function<bool()> anew = {};
 };
 
 /// Solves in rounds while the field folds or stretches at samples or triangles. Returns the measures of the
@@ -209,20 +213,20 @@ std::optional<MeshMeasures> unfold(RadialSolver& solver, const SurfaceSamples& s
   if (how.stretches)
     limits.most_stretch = std::max(most_stretch, beyond_samples * solver.report().distortion.max_stretch);
   std::optional<MeshMeasures> seen;
+  int rounds = how.rounds;
   for (int round = 0;; ++round) {
     const std::shared_ptr<const DeformationField> now = shown();
     if (samples.mesh) seen = measure_triangles(*now, *samples.mesh, limits);
     const bool is_wrong = seen && seen->is_wrong;
-    if (round == how.rounds ||
-        !(how.all_samples || is_wrong || solver.report().distortion.flipped_share > 0.0))
+    if (round == rounds || !(how.all_samples || is_wrong || solver.report().distortion.flipped_share > 0.0))
       break;
     const bool is_anew = round < rounds_anew && how.anew;
     const MeshPlaces places = is_wrong ? seen->wrong : MeshPlaces();
     if (solver.add_fold_samples(is_anew ? surface.barrier : how.barrier, *now, places) == 0) break;
-    if (is_anew)
-      how.anew();
-    else
+    if (!is_anew)
       solver.solve(how.steps, 0.0, progress);
+    else if (!how.anew())
+      rounds = round + 1;
   }
   return seen;
 }
@@ -281,9 +285,14 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   RadialSolver solver(samples, handles, fine, progress.part(done, 0.4), shape, blend);
   solver.set_contact(hooks.contact, true, progress);
   if (first) solver.adopt(*first, contact_first);
-  const Shown shown = [&] { return around(solver.field()); };
+  std::shared_ptr<DeformationField> kept;  // of before a solve that was not worth it
+  const Shown shown = [&] { return kept ? kept : around(solver.field()); };
   LoopResult loop =
       run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0, shown, {.least_gain = least_gain});
+  ObjectiveTerms terms;
+  terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
+  terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
+  terms.weights = energy_weights(samples, terms.handles);
   SolveHooks unseen = hooks;
   unseen.observer = nullptr;
   solver.set_hooks({hooks.energies, 1.0, {}, hooks.terms});
@@ -291,7 +300,11 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   how.rounds = was_ended(loop) || hooks.contact ? 0 : unfolding_rounds;
   how.steps = std::min(unfolding_steps, options.training.iterations);
   how.stretches = true;
+  RadialReport solved;  // of `kept`
   how.anew = [&] {
+    solved = solver.report();
+    const std::shared_ptr<DeformationField> before = shown();
+    const double energy = measure(*before, samples, terms).arap.energy;
     solver.reset();
     solver.set_targets(handles);
     if (first) solver.adopt(*first);
@@ -301,14 +314,14 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
       loop.history.emplace_back(loop.iterations + iterations, value);
     loop.iterations += again.iterations;
     loop.seconds += again.seconds;
+    if (measure(*shown(), samples, terms).arap.energy <= dearer * energy) return true;
+    kept = before;
+    return false;
   };
   std::optional<MeshMeasures> of_mesh =
       unfold(solver, samples, options.surface, how, shown, progress.part(0.97, 0.98));
-  ObjectiveTerms terms;
-  terms.stiffness = SurfaceStiffness(shape->thickness, options.surface);
-  terms.handles = BoundHandles(in_cube(handles, samples.frame), samples.points);
-  terms.weights = energy_weights(samples, terms.handles);
-  return finish(shown, samples, terms, std::move(loop), std::move(of_mesh), solver.report(), progress);
+  return finish(shown, samples, terms, std::move(loop), std::move(of_mesh), kept ? solved : solver.report(),
+                progress);
 }
 
 DeformOptions followed_closely(DeformOptions options) {
