@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/task.h"
-#include "solve/radial/barrier_surface.h"
+#include "solve/contact/surface.h"
 
 namespace arapfields {
 

@@ -76,6 +76,9 @@ struct FullSolve {
   /// A deformation goes on also where it stretches the mesh more than the first, and than the energy samples
   /// by the second factor: these are not seen there.
   static constexpr double most_stretch = 3.0, beyond_samples = 1.5;
+  /// A solve anew is not kept if the samples' energy is so many times that of before: at places where parts
+  /// touch and come apart, what the field stretches is no surface.
+  static constexpr double dearer = 3.0;
 };
 
 template <class Options>
@@ -221,9 +224,10 @@ struct Unfolding {
   int rounds = 0, steps = 0;
   bool all_samples = false;  ///< look at all samples; else only where the mesh or the energy samples fold
   bool stretches = false;    ///< whether stretches count
-  /// Solves anew in `rounds_anew`, without a barrier; empty: goes on from the present shape. Where nothing
-  /// held the field it may be so far off that descent from there is slow, and behind the barrier stuck.
-  std::function<void()> anew = {};
+  /// Solves anew in `rounds_anew`, without a barrier, and returns whether that is to be kept; empty: goes on
+  /// from the present shape. Where nothing held the field it may be so far off that descent from there is
+  /// slow, and behind the barrier stuck.
+  std::function<bool()> anew = {};
 };
 
 /// Solves in rounds while the field folds or stretches at samples or triangles. Returns the measures of the
@@ -236,20 +240,20 @@ std::optional<MeshMeasures> unfold(RadialSolver& solver, const SurfaceSamples& s
     limits.most_stretch =
         std::max(FullSolve::most_stretch, FullSolve::beyond_samples * solver.report().distortion.max_stretch);
   std::optional<MeshMeasures> seen;
+  int rounds = how.rounds;
   for (int round = 0;; ++round) {
     const std::shared_ptr<const DeformationField> now = shown();
     if (samples.mesh) seen = measure_triangles(*now, *samples.mesh, limits);
     const bool is_wrong = seen && seen->is_wrong;
-    if (round == how.rounds ||
-        !(how.all_samples || is_wrong || solver.report().distortion.flipped_share > 0.0))
+    if (round == rounds || !(how.all_samples || is_wrong || solver.report().distortion.flipped_share > 0.0))
       break;
     const bool is_anew = round < FullSolve::rounds_anew && how.anew;
     const MeshPlaces places = is_wrong ? seen->wrong : MeshPlaces();
     if (solver.add_fold_samples(is_anew ? surface.barrier : how.barrier, *now, places) == 0) break;
-    if (is_anew)
-      how.anew();
-    else
+    if (!is_anew)
       solver.solve(how.steps, 0.0, progress);
+    else if (!how.anew())
+      rounds = round + 1;
   }
   return seen;
 }
@@ -310,9 +314,11 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   RadialSolver solver(samples, handles, fine, progress.part(done, 0.4), shape, blend);
   solver.set_contact(hooks.contact, true, progress);
   if (first) solver.adopt(*first, contact_first);
-  const Shown shown = [&] { return around(solver.field()); };
+  std::shared_ptr<DeformationField> kept;  // of before a solve that was not worth it
+  const Shown shown = [&] { return kept ? kept : around(solver.field()); };
   LoopResult loop = run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0, shown,
                         {.least_gain = FullSolve::least_gain});
+  const ObjectiveTerms terms = measured_terms(samples, handles, *shape, options.surface);
   SolveHooks unseen = hooks;
   unseen.observer = nullptr;
   solver.set_hooks({hooks.energies, 1.0, {}, hooks.terms});
@@ -320,7 +326,11 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   how.rounds = was_ended(loop) || hooks.contact ? 0 : FullSolve::unfolding_rounds;
   how.steps = std::min(FullSolve::unfolding_iterations, options.training.iterations);
   how.stretches = true;
+  RadialReport solved;  // of `kept`
   how.anew = [&] {
+    solved = solver.report();
+    const std::shared_ptr<DeformationField> before = shown();
+    const double energy = measure(*before, samples, terms).arap.energy;
     solver.reset();
     solver.set_targets(handles);
     if (first) solver.adopt(*first);
@@ -330,11 +340,14 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
       loop.history.emplace_back(loop.iterations + iterations, value);
     loop.iterations += again.iterations;
     loop.seconds += again.seconds;
+    if (measure(*shown(), samples, terms).arap.energy <= FullSolve::dearer * energy) return true;
+    kept = before;
+    return false;
   };
   std::optional<MeshMeasures> of_mesh =
       unfold(solver, samples, options.surface, how, shown, progress.part(0.97, 0.98));
-  const ObjectiveTerms terms = measured_terms(samples, handles, *shape, options.surface);
-  return finish(shown, samples, terms, std::move(loop), std::move(of_mesh), solver.report(), progress);
+  return finish(shown, samples, terms, std::move(loop), std::move(of_mesh), kept ? solved : solver.report(),
+                progress);
 }
 
 DeformOptions followed_closely(DeformOptions options) {
