@@ -56,6 +56,7 @@ def before_undo(*_):
 
 @persistent
 def before_save(*_):
+    former_defaults.stamp()
     display.clear_previews()
 
 
