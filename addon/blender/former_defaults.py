@@ -45,7 +45,7 @@ def even_strength(share):
 
 def stamp():
     """Before a file is saved: objects with a style's strength have the newest meaning of it."""
-    for source in bpy.data.objects:
+    for source in list(bpy.data.objects):
         settings = settings_of(source)
         if source.library is None and settings.stylize.is_property_set("strength") and not settings.handles:
             settings.defaults = NEWEST
