@@ -57,6 +57,7 @@ def before_undo(*_):
 
 @persistent
 def before_save(*_):
+    former_defaults.stamp()
     display.clear_previews()
 
 

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Defaults that have changed: objects of older files keep the former ones, and so their shapes."""
+"""Defaults and meanings that have changed: objects of older files keep the former, and so their shapes."""
+
+import math
 
 import bpy
 
 from .object_references import settings_of
 
 # Settings by group, with the values that were the defaults of version 0, 1, …
-FORMER = [{("deform", "locality"): 0.0}]
+FORMER = [{("deform", "locality"): 0.0}, {}]
 NEWEST = len(FORMER)
+EVEN = 2  # the version from which on half of a style's strength moves a surface by half of the way
+GROWTH = 80.0  # of the even strength's weight; before, the strength was the share of the weight itself
 
 
 def begin(settings):
@@ -16,14 +20,32 @@ def begin(settings):
 
 
 def keep():
-    """Gives settings of older files that were never set the values that they had there."""
+    """Gives settings of older files that were never set the values that they had there, and those that were
+    set and mean something else now the values that mean the same."""
     for source in list(bpy.data.objects):
         settings = settings_of(source)
-        if not settings.handles or settings.defaults >= NEWEST:
+        styled = settings.stylize.is_property_set("strength")
+        if not (settings.handles or styled) or settings.defaults >= NEWEST:
             continue
-        for former in FORMER[settings.defaults :]:
-            for (group, name), value in former.items():
-                own = getattr(settings, group)
-                if not own.is_property_set(name):
-                    setattr(own, name, value)
+        if settings.handles:
+            for former in FORMER[settings.defaults :]:
+                for (group, name), value in former.items():
+                    own = getattr(settings, group)
+                    if not own.is_property_set(name):
+                        setattr(own, name, value)
+        if styled and settings.defaults < EVEN:
+            settings.stylize.strength = even_strength(settings.stylize.strength)
         settings.defaults = NEWEST
+
+
+def even_strength(share):
+    """The strength that gives a style this share of its whole weight."""
+    return math.log1p((GROWTH - 1) * share) / math.log(GROWTH) if 0 <= share < 1 else share
+
+
+def stamp():
+    """Before a file is saved: objects with a style's strength have the newest meaning of it."""
+    for source in list(bpy.data.objects):
+        settings = settings_of(source)
+        if source.library is None and settings.stylize.is_property_set("strength") and not settings.handles:
+            settings.defaults = NEWEST

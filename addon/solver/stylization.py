@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A style's solve from rest, and its finish on the mesh's vertices: of the operator, live mode and bakes."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,7 +62,9 @@ def stylization(values, directions, up, handles, region, contact, machine=None):
     if values["finish"] and not (contact is not None and contact.itself):
         shared = {name: values[name] for name in ("strength", "sharpness", "rigidity")}
         finish = options_of("sharpen", shared, machine)
-        values = values | {"centers": native.library().CENTERS_BEFORE_SHARPEN}
+        af = native.library()
+        iterations = min(values.get("iterations", math.inf), af.ITERATIONS_BEFORE_SHARPEN)
+        values = values | {"centers": af.CENTERS_BEFORE_SHARPEN, "iterations": iterations}
     options = options_of("stylize", values, machine)
     return Stylization(directions, up, options, finish, handles, region, contact)
 

@@ -10,6 +10,7 @@ namespace arapfields::python {
 
 void bind_sharpen(py::module_& module) {
   module.attr("CENTERS_BEFORE_SHARPEN") = centers_before_sharpen;
+  module.attr("ITERATIONS_BEFORE_SHARPEN") = iterations_before_sharpen;
   module.def(
       "sharpen",
       [](const ArrayArgument& vertices, const ArrayArgument& triangles, const ArrayArgument& moved,

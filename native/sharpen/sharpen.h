@@ -10,8 +10,8 @@
 
 namespace arapfields {
 
-/// As StylizeOptions::centers, enough for a field whose result sharpen() finishes.
-inline constexpr int centers_before_sharpen = 500;
+/// As StylizeOptions::centers and iterations, enough for a field whose result sharpen() finishes.
+inline constexpr int centers_before_sharpen = 500, iterations_before_sharpen = 60;
 
 /// Brings a mesh that a field has stylized nearer to its style, by its own vertices: (n,3) of `moved`,
 /// sharpened. In turns, each vertex gets the rotation that fits its edges best, each triangle loses what its

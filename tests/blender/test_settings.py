@@ -241,3 +241,35 @@ def test_an_object_without_handles_has_the_newest():
     bar = scenes.bar()
     former_defaults.keep()
     assert bar.arapfields.deform.locality == pytest.approx(USUAL)
+
+
+def test_a_strength_of_an_older_file_keeps_its_weight(tmp_path):
+    """Once: what is saved after that stays. So does the whole strength."""
+    bars = {}
+    for strength in (0.1, 0.5, 1.0):
+        bar = scenes.bar()
+        bar.arapfields.stylize.strength = strength
+        bars[bar.name] = strength
+    file = str(tmp_path / "styled.blend")
+    stamp, former_defaults.stamp = former_defaults.stamp, lambda: None  # the older extension had none
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=file)
+    finally:
+        former_defaults.stamp = stamp
+    for _ in range(2):
+        bpy.ops.wm.open_mainfile(filepath=file)
+        for name, share in bars.items():
+            strength = bpy.data.objects[name].arapfields.stylize.strength
+            growth = former_defaults.GROWTH
+            weight = (growth**strength - 1) / (growth - 1)
+            assert weight == pytest.approx(share, rel=1e-4)
+        bpy.ops.wm.save_as_mainfile(filepath=file)
+
+
+def test_a_strength_that_is_saved_now_stays(tmp_path):
+    bar = scenes.bar()
+    bar.arapfields.stylize.strength = 0.5
+    name, file = bar.name, str(tmp_path / "styled.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    assert bpy.data.objects[name].arapfields.stylize.strength == pytest.approx(0.5)

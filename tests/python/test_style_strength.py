@@ -22,7 +22,8 @@ def test_a_share_of_the_strength_goes_that_share_of_the_way(name):
     samples = af.sample_mesh(rest, triangles, count=20000, seed=0)
 
     def way(strength):
-        options = af.StylizeOptions(strength=strength, centers=af.CENTERS_BEFORE_SHARPEN)
+        before = {"centers": af.CENTERS_BEFORE_SHARPEN, "iterations": af.ITERATIONS_BEFORE_SHARPEN}
+        options = af.StylizeOptions(strength=strength, **before)
         moved = af.stylize(samples, "cube", options)(rest)
         sharpened = af.sharpen(rest, triangles, moved, "cube", af.SharpenOptions(strength=strength), up=up)
         return np.linalg.norm(sharpened - rest, axis=1).mean()

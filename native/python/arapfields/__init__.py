@@ -8,6 +8,7 @@ from . import _loading as _loading  # first: the other modules import the native
 from ._copying import register as _register_copies
 from ._native import (
     CENTERS_BEFORE_SHARPEN,
+    ITERATIONS_BEFORE_SHARPEN,
     Attachment,
     Bone,
     Cancelled,
@@ -120,6 +121,7 @@ InverseOptions = InverseTrainingOptions
 
 __all__ = [
     "CENTERS_BEFORE_SHARPEN",
+    "ITERATIONS_BEFORE_SHARPEN",
     "ArrayLike",
     "Attachment",
     "Bone",

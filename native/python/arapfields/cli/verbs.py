@@ -103,6 +103,8 @@ def stylize(args):
     finishes = given(args, "stylize", "finish") and not itself and is_mesh
     if finishes and args.option_centers is None:
         options.centers = af.CENTERS_BEFORE_SHARPEN
+    if finishes and args.option_iterations is None:
+        options.iterations = af.ITERATIONS_BEFORE_SHARPEN
     _solve(args, solve, options.seed, needs_handles=False, finish=finish if finishes else None)
 
 
