@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..blender import former_defaults, mesh_arrays, modifier_stack, vertex_groups
+from ..blender import mesh_arrays, modifier_stack, property_definitions, vertex_groups
 from ..blender.evaluation import is_driven
 from ..blender.object_references import in_scene, settings_of
 from ..blender.point_data import selection_of
@@ -154,7 +154,7 @@ def choose_or_add(settings, index):
     """The handle in that row, or a new one for -1; makes its row active."""
     if index < 0:
         if not settings.handles:
-            former_defaults.begin(settings)
+            property_definitions.begin(settings)
         index, colour = len(settings.handles), free_colour(settings.handles)
         settings.handles.add().colour = colour
     choose_row(settings, index)

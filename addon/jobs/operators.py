@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender.guide import Guided
+from ..blender.source_operator import Guided
 from ..core.errors import UserError
 from ..core.runtime import jobs
 

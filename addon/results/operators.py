@@ -6,7 +6,7 @@ from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value, effective_values
 from ..blender.source_operator import SourceOperator
-from ..carried import carried_objects, rest_bones
+from ..carried import carrying, rest_bones
 from ..core.errors import UserError
 from ..core.runtime.jobs import Item
 from ..core.settings.parameters import EXTRACTION
@@ -72,7 +72,7 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
             self.report({"WARNING"}, translated(error))
         motion.remove(source)
         layers.uncover(source)
-        carried_objects.give_back_all(source)
+        carrying.give_back_all(source)
         helper.clear(source)
         if followers is not None:
             followers.follow(context, source, back=True)

@@ -18,10 +18,10 @@ if IN_BLENDER:
 
     import addon
     import addon.registration as registration
-    from addon.blender import former_defaults
+    from addon.blender import property_definitions
     from addon.blender.property_definitions import effective_values
+    from addon.core.settings.choices import STYLES, STYLIZE
     from addon.core.settings.parameters import DEFORM, FIT, TABLE
-    from addon.core.settings.styles import STYLES, STYLIZE
     from addon.solver import setup
 
 pytestmark = pytest.mark.in_blender
@@ -213,7 +213,7 @@ USUAL = af.DeformOptions().locality
 def reopened(tmp_path, defaults, locality=None):
     """Locality of a bar with handles, saved with that version of the defaults and opened again."""
     bar, *_ = scenes.bar_with_handles()
-    assert bar.arapfields.defaults == former_defaults.NEWEST
+    assert bar.arapfields.defaults == property_definitions.NEWEST
     bar.arapfields.defaults = defaults
     if locality is not None:
         bar.arapfields.deform.locality = locality
@@ -225,7 +225,7 @@ def reopened(tmp_path, defaults, locality=None):
 
 def test_an_older_file_keeps_the_former_default(tmp_path):
     settings = reopened(tmp_path, 0)
-    assert settings.deform.locality == 0.0 and settings.defaults == former_defaults.NEWEST
+    assert settings.deform.locality == 0.0 and settings.defaults == property_definitions.NEWEST
 
 
 @pytest.mark.parametrize("locality", [0.05, 0.1])
@@ -234,10 +234,10 @@ def test_and_what_was_set_in_it(tmp_path, locality):
 
 
 def test_a_new_file_keeps_the_newest(tmp_path):
-    assert reopened(tmp_path, former_defaults.NEWEST).deform.locality == pytest.approx(USUAL)
+    assert reopened(tmp_path, property_definitions.NEWEST).deform.locality == pytest.approx(USUAL)
 
 
 def test_an_object_without_handles_has_the_newest():
     bar = scenes.bar()
-    former_defaults.keep()
+    property_definitions.keep()
     assert bar.arapfields.deform.locality == pytest.approx(USUAL)
