@@ -9,9 +9,9 @@ import time
 import blf
 import bpy
 
-from .blender import host, timers
+from .blender import host
+from .blender.host import redraw
 from .blender.language import translated
-from .blender.redraw import redraw
 from .blender.user_preferences import preferences
 
 SECONDS = 40.0
@@ -40,7 +40,7 @@ def show():
     stored.was_welcomed = bpy.context.preferences.is_dirty = True  # else Blender would not save it
     welcome.until = time.monotonic() + SECONDS
     redraw(bpy.context, "WINDOW")
-    timers.start(end, first=SECONDS + 0.1)
+    host.start(end, first=SECONDS + 0.1)
 
 
 def end():
@@ -73,4 +73,4 @@ def draw():
 
 def start():
     if host.has_window() and not host.is_module():
-        timers.start(show, first=1.0)
+        host.start(show, first=1.0)

@@ -6,7 +6,7 @@ import sys
 
 import bpy
 
-from .blender import host, timers
+from .blender import host
 from .blender.language import translated
 from .core.runtime import native
 
@@ -31,4 +31,4 @@ def start():
         return
     print(f"ARAP Fields: {native.problem()}", file=sys.stderr, flush=True)
     if host.has_window() and not host.is_module():
-        timers.start(show, first=0.1)
+        host.start(show, first=0.1)

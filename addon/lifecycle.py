@@ -7,7 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import commands, first_run, install_check, menus
-from .blender import former_defaults, icons, library_loading, modifier_stack, timers, translations
+from .blender import former_defaults, host, icons, language, modifier_stack
 from .blender.host import has_window
 from .blender.language import translated
 from .carried import carrying
@@ -25,16 +25,15 @@ from .pin_tool.hints import status
 from .pin_tool.hover import hover
 from .poses import applying
 from .solver import style_object
-from .surface import staleness
+from .surface import surface_fit
 from .viewport import handle_boxes, previews
-from .wrap import drawing as landmark_drawing
-from .wrap import landmarks
+from .wrap import landmark_tools, landmarks
 
 
 @persistent
 def before_load(*_):
     """The file is about to go: whatever works on it ends, and nothing of it is applied."""
-    passing = (jobs.board, held_counts.pending, staleness.changed, row_selection.seen, prefetch)
+    passing = (jobs.board, held_counts.pending, surface_fit.changed, row_selection.seen, prefetch)
     for state in (*passing, applying.solved, first_result.steps, left_behind.seen, stored.shapes):
         state.clear()
     applied_transforms.seen.clear()
@@ -81,7 +80,7 @@ def after_restore(*_):
 @persistent
 def after_update(scene, depsgraph):
     if not modifier_stack.is_stage(scene):
-        staleness.watch(depsgraph)
+        surface_fit.watch(depsgraph)
         if not sessions.live.is_rendering:
             applied_transforms.follow(depsgraph)
         sessions.watch(depsgraph)
@@ -130,22 +129,22 @@ HANDLERS = {  # of bpy.app.handlers
 }
 DRAWINGS = (  # over every 3D viewport
     *((previews.draw, "POST_VIEW"), (handle_boxes.draw, "POST_VIEW"), (pin_drawing.draw, "POST_VIEW")),
-    *((touching.draw, "POST_VIEW"), (landmark_drawing.draw, "POST_PIXEL")),
+    *((touching.draw, "POST_VIEW"), (landmark_tools.draw, "POST_PIXEL")),
     *((pin_drawing.draw_label, "POST_PIXEL"), (first_run.draw, "POST_PIXEL")),
 )
 PARTS = (  # what begins with the extension, and how it ends
     (icons.load, icons.clear),
-    (translations.load, translations.clear),
+    (language.load, language.clear),
     (commands.register, commands.unregister),
     (menus.begin, menus.end),
     (first_run.start, None),
-    (library_loading.start, None),
+    (host.start_loading, None),
     (install_check.start, None),
     (tool.register, tool.unregister),
 )
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
-# Timers are started by blender/timers.py, threads by core/runtime/threads.py.
-STATE = (modal.runs, jobs.board, display, sessions.live, held_counts.pending, staleness.changed)
+# Timers are started by blender/host.py, threads by core/runtime/threads.py.
+STATE = (modal.runs, jobs.board, display, sessions.live, held_counts.pending, surface_fit.changed)
 STATE += (
     motion.written,
     carrying.written,
@@ -157,7 +156,7 @@ STATE += (
 )
 STATE += (
     row_selection.seen,
-    timers,
+    host,
     style_object.cache,
     left_behind.seen,
     stored.shapes,

@@ -7,7 +7,6 @@ from .animation.properties import ARAPFIELDS_PG_bake
 from .blender.object_references import owner_of, settings_of
 from .blender.property_definitions import choice, collection, flag, integer, number, pointer, tells, text
 from .blender.selection import row_chosen
-from .carried.properties import ARAPFIELDS_PG_carried
 from .contact.properties import ARAPFIELDS_PG_contact
 from .core.settings.choices import NORMALS
 from .handles.properties import ARAPFIELDS_PG_handle
@@ -15,6 +14,7 @@ from .live.properties import ARAPFIELDS_PG_secondary
 from .names import BONE_NUMBER, PROPERTY
 from .pin_tool.properties import ARAPFIELDS_PG_scene
 from .properties.choices import RESULT_ITEMS, extraction, output, result, surface
+from .properties.records import ARAPFIELDS_PG_carried
 from .properties.solve_settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
 from .skin.properties import ARAPFIELDS_PG_skin
 from .stiffness.properties import ARAPFIELDS_PG_stiffness

@@ -7,31 +7,24 @@ import importlib
 import bpy
 
 from . import lifecycle, object_properties
-from .blender import guide, host
+from .blender import host, source_operator
 
 CONTENTS = [  # modules with CLASSES
     # what is stored in the .blend: object.arapfields
-    *("handles.properties", "carried.properties", "poses.properties", "pin_tool.properties"),
-    *("stiffness.properties", "live.properties", "animation.properties", "wrap.properties"),
-    *("skin.properties", "contact.properties"),
+    *("handles.properties", "properties.records", "pin_tool.properties", "live.properties"),
+    *("stiffness.properties", "animation.properties", "wrap.properties", "skin.properties"),
+    "contact.properties",
     *("properties.solve_settings", "object_properties"),
     # features
-    *("tasks.panel", "surface.operators", "surface.panel"),
+    *("tasks.panel", "surface.operators"),
     *("handles.operators", "handles.resizing", "handles.left_behind", "handles.panel"),
     *("deform.operators", "deform.subdividing", "deform.panel"),
     *("stylize.operators", "stylize.panel"),
-    *("wrap.operators", "wrap.clicking", "wrap.suggesting", "wrap.refitting", "wrap.sheet", "wrap.panel"),
-    *("skin.operators", "skin.panel"),
-    *("carried.operators", "carried.panel", "poses.operators", "poses.panel"),
-    *("stiffness.operators", "stiffness.panel"),
+    *("wrap.operators", "wrap.landmark_tools", "wrap.refitting", "wrap.sheet", "wrap.panel"),
+    *("skin.operators", "carried.operators", "poses.operators", "stiffness.operators"),
     *("contact.operators", "contact.panel"),
-    *("live.operators", "live.panel", "pin_tool.operators", "animation.operators"),
-    *(
-        "animation.export_operators",
-        "animation.splat_operators",
-        "animation.nodes_operator",
-        "animation.panel",
-    ),
+    *("live.operators", "live.panel", "pin_tool.operators"),
+    *("animation.operators", "animation.exporters", "animation.splat_export", "animation.panel"),
     *("results.operators", "results.panel", "jobs.operators", "jobs.panel"),
     *("menus", "preferences"),
 ]
@@ -44,7 +37,7 @@ def register():
         for cls in CLASSES:
             bpy.utils.register_class(cls)
         object_properties.attach()
-        guide.begin(CLASSES)
+        source_operator.begin(CLASSES)
         lifecycle.register()
     except Exception:
         unregister()
@@ -61,7 +54,7 @@ def unregister():
     atexit.unregister(unregister)
     atexit.unregister(lifecycle.end_threads)
     lifecycle.unregister()
-    guide.end()
+    source_operator.end()
     object_properties.detach()
     for cls in reversed(CLASSES):
         if "bl_rna" in vars(cls):  # is registered; gizmo groups have no other way to tell

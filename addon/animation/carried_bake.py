@@ -14,8 +14,8 @@ from ..blender import modifier_stack, references
 from ..blender.actions import key_at
 from ..blender.language import translated
 from ..carried import played_points
-from ..carried.carried_objects import carrier_class, find
 from ..carried.carriers import MeshCarrier
+from ..carried.carrying import carrier_class, find
 from ..carried.points import (
     BAKED_KEY,
     AttributeCarrier,

@@ -8,7 +8,7 @@ from math import ceil, floor
 
 from ..blender.actions import pace
 from ..core.errors import UserError
-from ..core.runtime.progress import JobCancelled
+from ..core.runtime.jobs import JobCancelled
 from ..solver import frame_range
 
 NOISE = 1e-3  # rounding error of a keyframe's position, in frames

@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One object's bake: its solver, the store of its frames, and the modifier or keys that play them."""
+"""One object's bake: its solver, the store of its frames, shared parts, loops, and what plays them."""
 
 import functools
+import hashlib
 import json
+import time
+from dataclasses import replace
+
+import numpy as np
 
 from ..blender import mesh_arrays
 from ..blender.actions import varies
@@ -16,12 +21,121 @@ from ..results import placement, result_objects, visibility
 from ..solver import contact, secondary_motion
 from ..solver.frame_solver import FrameSolver
 from ..solver.setup import sampled
-from ..solver.simulation import Poses, Simulation
+from ..solver.simulation import Moment, Poses, Simulation
 from ..solver.source_reader import SourceChanged, SourceReader, has_motion_before
-from . import loops
 from .caches import CacheFile, ShapeKeys, cache_beside, keys_weight, size_text
 from .carried_bake import CarriedBake
-from .parts import SharedCache
+
+# Bakes of looping secondary motion, whose last frame equals the first.
+
+ROUNDS = 12  # most passes through the animation
+# Largest distance of the last frame from the first, as a share of the size. The remaining gap is distributed
+# over the frames; it is comparable to the error of a single step.
+CLOSED = 2e-3
+
+
+def solve(solver, simulation, frames, keep, task=None):
+    """Simulates the frames, [(frame, request, whether it is baked)], in rounds until the motion repeats; then
+    passes each baked shape to `keep`. UserError if it does not repeat. Holds all shapes in memory."""
+    start, request, _ = frames[0]
+    simulation.start = int(start)
+    first = simulation.shape(solver, start, request, task)
+    size = np.ptp(first.points, axis=0).max()
+    repeats = comes_back(request, frames[-1][1], CLOSED * size)
+    for _ in range(ROUNDS if repeats else 0):
+        shapes = [first]
+        for frame, asked, _ in frames[1:]:
+            shapes.append(simulation.shape(solver, frame, asked, task))
+        first, left = shapes[-1], shapes[0].points - shapes[-1].points
+        simulation.moments = {int(start): Moment(solver.solver.motion_state, request.motion, True)}
+        if np.abs(left).max() < CLOSED * size:
+            break
+    else:
+        raise UserError(
+            "The last frame does not come back to the first; loop the animation, or raise Damping"
+        )
+    for (frame, _, is_baked), shape in zip(frames, shapes, strict=True):
+        if is_baked:
+            share = np.float32((frame - start) / max(frames[-1][0] - start, 1.0))
+            keep(replace(shape, points=shape.points + share * left))
+
+
+def comes_back(first, last, near):
+    """Whether the handles and the object end where they started."""
+    pairs = list(zip(first.targets, last.targets, strict=True))
+    if first.motion is not None and last.motion is not None:
+        pairs.append((first.motion.world, last.motion.world))
+    return all(np.allclose(one, other, rtol=0.0, atol=near) for one, other in pairs)
+
+
+# Bakes shared by several processes. Each solves a part of the frames and stores them beside the cache; the
+# one that completes them writes the cache. Frames of a killed process stay for the next one.
+
+
+class SharedCache(CacheFile):
+    """`part` is (i, n), the i-th of n, 1 ≤ i ≤ n; `missing`: number of frames not solved yet."""
+
+    def __init__(self, path, frames, fps, part):
+        super().__init__(path, frames, fps)
+        self.part, self.missing, self._began = part, 0, time.time()
+        self._store, self._points, self._places, self._digested = None, 0, [], (None, b"")
+
+    def open(self, solver):
+        from arapfields import __version__
+        from arapfields.cli.frames import FrameStore
+
+        setup, region, surface = solver.sampled.setup, solver.sampled.region, solver.sampled.setup.surface
+        common = [__version__, setup.kind, surface.exact, surface.fit.options, setup.cells]
+        content = repr(common).encode() + surface.vertices.tobytes() + surface.triangles.tobytes()
+        content += solver.rest.tobytes() + b"".join(handle_bytes(handle) for handle in setup.handles)
+        if region is not None:
+            content += region.tobytes()
+        self._points = len(solver.rest)
+        self._folder.make()
+        self._store = FrameStore(self.path, self._points, content)
+
+    def add_request(self, solver, request):
+        """Solves a frame if it belongs to this part and is not stored yet."""
+        number, parts = self.part
+        index = len(self._places)
+        place = self._store.place(index, self._key(request))
+        self._places.append(place)
+        if index % parts == number - 1 and not self._store.has(place):
+            self._store.put(place, solver.solve_from_rest(request).points)
+
+    def _key(self, request):
+        """Arrays that identify a request."""
+        if self._digested[0] is not request.points:
+            digest = hashlib.blake2b(request.points.tobytes(), digest_size=16).digest()
+            self._digested = request.points, digest
+        further = repr([request.style_key, sorted(request.energy.items())]).encode()
+        digest = hashlib.blake2b(further + self._digested[1], digest_size=16).digest()
+        return [*request.targets, np.frombuffer(digest, np.uint8)]
+
+    def finish(self):
+        """Makes the cache once all of its frames are solved."""
+        with self._store.alone():
+            self.missing = sum(not self._store.has(place) for place in self._places)
+            if self.missing and self.path.exists() and self.path.stat().st_mtime > self._began:
+                self.missing = 0  # another process has written it meanwhile
+            elif not self.missing:
+                self.open_for(self._points)
+                for place in self._places:
+                    self.add(self._store.get(place))
+                self._writer.commit()
+                self._store.remove(self._places)
+
+    def commit(self):
+        """Does nothing: `finish` has committed the cache on the worker."""
+
+
+def handle_bytes(handle):
+    """Bytes that identify a handle at rest."""
+    parts = [handle.kind, handle.weight, handle.rest, getattr(handle, "weights", None)]
+    return b"".join(part.tobytes() if isinstance(part, np.ndarray) else repr(part).encode() for part in parts)
+
+
+# One object's bake: its solver, the store of its frames, and the modifier or keys that play them.
 
 STYLE_PATH = "arapfields.stylize"  # data path of a style's F-curves
 
@@ -130,7 +244,7 @@ class ObjectBake:
 
     def finish(self, task):
         if self.looped is not None:
-            loops.solve(self.solver, self.simulation, self.looped, self.keep, task)
+            solve(self.solver, self.simulation, self.looped, self.keep, task)
         self.carried.finish()
         self.store.finish()
 

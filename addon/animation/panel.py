@@ -8,7 +8,7 @@ from ..blender.section import Section, draw_settings, job_button, modifier_row, 
 from ..blender.splat_layouts import holds_splats
 from ..names import Op
 from ..solver import frame_range
-from . import caches, played
+from . import caches
 
 
 class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
@@ -37,7 +37,7 @@ class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
         if modifier is not None:
             modifier_row(layout, modifier, "MOD_MESHDEFORM", Op.REMOVE_BAKE)
             layout.prop(modifier, "filepath", text="")
-            note(layout, played.problem(source))
+            note(layout, caches.problem(source))
         layout.menu("ARAPFIELDS_MT_export", icon="EXPORT")
 
 

@@ -9,12 +9,11 @@ from types import SimpleNamespace
 
 import bpy
 
-from ..blender import modifier_kinds, modifier_stack
+from ..blender import modifier_stack
 from ..blender.evaluation import depsgraph_of, world_matrix
 from ..blender.language import translated
-from ..blender.native_options import options_of
 from ..blender.object_references import ObjectReference, owner_of, settings_of
-from ..blender.property_definitions import effective_values
+from ..blender.property_definitions import effective_values, options_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
@@ -66,7 +65,7 @@ def put_after_armatures(item):
         return
     first = stack.index(cache)
     last = max((k for k, one in enumerate(stack) if one.type == "ARMATURE"), default=first)
-    if last > first and all(map(modifier_kinds.keeps_vertices, stack[first:last])):
+    if last > first and all(map(modifier_stack.kind_keeps_vertices, stack[first:last])):
         item.modifiers.move(first, last)
 
 

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import UserError, refuse
-from ..core.geometry.fitting import vertex_areas
+from ..core.geometry.transfer import vertex_areas
 from . import modifier_stack, splat_layouts
 from .point_data import face_count, points_of
 

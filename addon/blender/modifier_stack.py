@@ -1,20 +1,145 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The place of the field's modifier in an object's stack, and the object's shape there.
-
-The shape is evaluated on a copy with a shortened stack, in a temporary scene: the user's data are unchanged.
-"""
+"""The kinds of modifiers, the place of the field's in an object's stack, and the object's shape there."""
 
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import bpy
 
 from ..core.errors import UserError
 from ..names import FIELD_GROUP, LAYER_GROUP
-from . import modifier_kinds
 from .evaluation import is_disabled, updated
 from .object_references import settings_of
-from .removal import remove_modifier
+from .references import remove_modifier
 from .splat_layouts import holds_splats
+
+# What each kind of modifier does to a mesh, from which a new field modifier's place follows.
+#
+# A field acts on the shape that is seen, so it stands behind what makes or moves that shape. It stands
+# before what only refines, hides or uses it, so that this follows the moved surface.
+
+MAKES = "makes"  # vertices, from others or from elsewhere
+MOVES = "moves"  # vertices
+WRITES = "writes"  # other data, by where the vertices are
+REFINES = "refines"  # the shape, or its normals
+HIDES = "hides"  # a part of it
+USES = "uses"  # the surface where it stands in the stack, for something else
+
+
+@dataclass(frozen=True)
+class Kind:
+    """`keeps`: every vertex stays, with its index."""
+
+    role: str
+    keeps: bool
+    why: str
+
+    @property
+    def follows_field(self):
+        """Whether a new field modifier is put before it."""
+        return self.role in (REFINES, HIDES, USES)
+
+
+def keeping(role, why):
+    return Kind(role, True, why)
+
+
+def changing(role, why):
+    return Kind(role, False, why)
+
+
+UNKNOWN = changing(MAKES, "it may make the shape")
+KINDS = {
+    # Modify
+    "DATA_TRANSFER": keeping(WRITES, "what it takes from another mesh belongs to the places at rest"),
+    "MESH_CACHE": keeping(MOVES, "a cache has the shape that the field acts on"),
+    "MESH_SEQUENCE_CACHE": changing(MAKES, "a file has the shape, with any number of vertices"),
+    "NORMAL_EDIT": keeping(REFINES, "normals are of the moved shape"),
+    "WEIGHTED_NORMAL": keeping(REFINES, "normals are of the moved shape"),
+    "UV_PROJECT": keeping(WRITES, "textures move with the surface: they are projected at rest"),
+    "UV_WARP": keeping(WRITES, "it does not depend on the shape"),
+    "VERTEX_WEIGHT_EDIT": keeping(WRITES, "the field's mask may be the group"),
+    "VERTEX_WEIGHT_MIX": keeping(WRITES, "the field's mask may be the group"),
+    "VERTEX_WEIGHT_PROXIMITY": keeping(WRITES, "the field's mask may be the group"),
+    # Generate
+    "ARRAY": changing(MAKES, "handles take hold of all copies"),
+    "BEVEL": changing(REFINES, "the bevel's width is of the moved shape"),
+    "BOOLEAN": changing(MAKES, "the cut is where the other object stands, and moves with the surface"),
+    "BUILD": changing(HIDES, "it shows more faces from frame to frame"),
+    "DECIMATE": changing(MAKES, "it would choose other vertices for each moved shape"),
+    "EDGE_SPLIT": changing(REFINES, "it splits sharp edges of the moved shape, and tears nothing"),
+    "MASK": changing(HIDES, "what it hides moves with the rest"),
+    "MESH_TO_VOLUME": changing(MAKES, "of volumes alone"),
+    "MIRROR": changing(MAKES, "the field moves both halves"),
+    "MULTIRES": changing(REFINES, "its detail turns with the moved shape"),
+    "NODES": changing(MAKES, "nodes may make the shape"),
+    "REMESH": changing(MAKES, "it would make other vertices for each moved shape"),
+    "SCREW": changing(MAKES, "the field moves the surface, not its profile"),
+    "SKIN": changing(MAKES, "the field moves the surface, not its edges"),
+    "SOLIDIFY": changing(REFINES, "the thickness is of the moved shape"),
+    "SUBSURF": changing(REFINES, "few vertices move, and the moved shape is smooth"),
+    "TRIANGULATE": changing(REFINES, "polygons are divided by the moved shape"),
+    "VOLUME_TO_MESH": changing(MAKES, "the surface is made here"),
+    "WELD": changing(MAKES, "distances at rest say what is one"),
+    "WIREFRAME": changing(REFINES, "the thickness is of the moved shape"),
+    "LINEART": changing(MAKES, "of Grease Pencil alone"),
+    # Deform
+    "ARMATURE": keeping(MOVES, "the field acts on the posed shape, but where it is told the unposed one"),
+    "CAST": keeping(MOVES, "the field acts on the shape that is seen"),
+    "CORRECTIVE_SMOOTH": keeping(MOVES, "it would smooth the field's motion away"),
+    "CURVE": keeping(MOVES, "the field acts on the shape that is seen"),
+    "DISPLACE": keeping(MOVES, "the field acts on the shape that is seen"),
+    "HOOK": keeping(MOVES, "the field acts on the shape that is seen"),
+    "LAPLACIANDEFORM": keeping(MOVES, "its anchors are bound to the shape at rest"),
+    "LAPLACIANSMOOTH": keeping(MOVES, "handles hold the points that are seen"),
+    "LATTICE": keeping(MOVES, "the field acts on the shape that is seen"),
+    "MESH_DEFORM": keeping(MOVES, "it is bound to the shape at rest"),
+    "SHRINKWRAP": keeping(MOVES, "it would take the shape back onto its target"),
+    "SIMPLE_DEFORM": keeping(MOVES, "the field acts on the shape that is seen"),
+    "SMOOTH": keeping(MOVES, "handles hold the points that are seen"),
+    "SURFACE_DEFORM": keeping(MOVES, "it is bound to the shape at rest"),
+    "VOLUME_DISPLACE": changing(MAKES, "of volumes alone"),
+    "WARP": keeping(MOVES, "the field acts on the shape that is seen"),
+    "WAVE": keeping(MOVES, "the field acts on the shape that is seen"),
+    # Physics
+    "CLOTH": keeping(MOVES, "a simulation would take the field's motion back"),
+    "COLLISION": keeping(USES, "others collide with the surface that is seen"),
+    "DYNAMIC_PAINT": changing(USES, "it paints where the surface is seen, or is painted there"),
+    "EXPLODE": changing(USES, "pieces fly off the moved surface"),
+    "FLUID": changing(USES, "a fluid meets the surface that is seen"),
+    "OCEAN": changing(MAKES, "the waves are made here"),
+    "PARTICLE_INSTANCE": changing(MAKES, "handles take hold of all copies"),
+    "PARTICLE_SYSTEM": keeping(USES, "hair grows on the surface that is seen"),
+    "SOFT_BODY": keeping(MOVES, "a simulation would take the field's motion back"),
+    "SURFACE": keeping(USES, "force fields act from the surface that is seen"),
+}
+
+
+def kind_of(modifier):
+    if modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN":
+        return UNKNOWN  # the fluid is its shape
+    return KINDS.get(modifier.type, UNKNOWN)
+
+
+def follows_field(modifier):
+    """Whether a new field modifier is put before this one at the end of a stack, or pinned there."""
+    return kind_of(modifier).follows_field or getattr(modifier, "use_pin_to_last", False)
+
+
+def kind_keeps_vertices(modifier):
+    """Whether every vertex keeps its index."""
+    return kind_of(modifier).keeps
+
+
+def uses_surface(modifier):
+    """Whether what it does is bound to the surface where it stands, and stays if the field comes later."""
+    return kind_of(modifier).role == USES
+
+
+# The place of the field's modifier in an object's stack, and the object's shape there.
+#
+# The shape is evaluated on a copy with a shortened stack, in a temporary scene: the user's data are
+# unchanged.
 
 STAGE = "arapfields_stage"  # custom property of the scene that holds the copy
 TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")  # render settings that map frames to time
@@ -73,7 +198,7 @@ def end(stack):
     """Index for a new deform modifier at the end of a stack, before modifiers that only refine, hide or use
     the shape."""
     index, least = len(stack), earliest(stack)
-    while index > least and modifier_kinds.follows_field(stack[index - 1]):
+    while index > least and follows_field(stack[index - 1]):
         index -= 1
     return index
 
@@ -134,7 +259,7 @@ def is_posing(source, modifier):
 def left_behind(source):
     """The modifiers that use the surface before the field moves it, such as hair, and so do not follow it."""
     stack = list(source.modifiers)[: place(source)]
-    return [one for one in stack if one.show_viewport and modifier_kinds.uses_surface(one)]
+    return [one for one in stack if one.show_viewport and uses_surface(one)]
 
 
 def shown_before(source, in_place):
@@ -149,7 +274,7 @@ def behind(source):
 def keeps_vertices(source):
     """Whether the vertices at the field's place are the mesh's own, by index, in viewport and render."""
     return all(
-        modifier_kinds.keeps_vertices(modifier) or is_layer(modifier)
+        kind_keeps_vertices(modifier) or is_layer(modifier)
         for modifier in before(source, in_place=True)
         if modifier.show_viewport or modifier.show_render
     )

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""References to objects across ticks of a job, by session_uid: Python references become invalid."""
+"""References to objects and scenes across ticks of a job, by session_uid: Python's become invalid."""
 
 import bpy
 
 from ..core.errors import UserError
 from ..names import PROPERTY
 from .splat_layouts import holds_splats
+
+# References to objects across ticks of a job, by session_uid: Python references become invalid.
 
 
 class ObjectReference:
@@ -126,3 +128,25 @@ def refusal_of_linked(item):
     if item.library is not None:
         return UserError("{name} is linked from another file; make it local first", item)
     return None
+
+
+# Reference to a job's scene across its ticks: the window may switch scenes, or the scene may be deleted.
+
+
+class SceneReference:
+    """Refers to the context's scene and view layer, on which evaluation and visibility depend."""
+
+    def __init__(self, context):
+        self.name, self.uid = context.scene.name, context.scene.session_uid
+        self.layer = context.view_layer.name
+
+    def missed(self, context):
+        """The name of the scene or view layer that the window no longer shows, or ""; UserError if the scene
+        was deleted."""
+        if context.scene.session_uid == self.uid:
+            is_other = context.view_layer.name != self.layer and self.layer in context.scene.view_layers
+            return self.layer if is_other else ""
+        scene = next((scene for scene in bpy.data.scenes if scene.session_uid == self.uid), None)
+        if scene is None:
+            raise UserError("{name} was deleted while it was worked on", self)
+        return scene.name

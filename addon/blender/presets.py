@@ -6,9 +6,8 @@ from bl_operators.presets import AddPresetBase
 
 from ..core.settings.parameters import presets
 from ..names import PROPERTY
-from .guide import SETTINGS
 from .object_references import settings_of, source_of
-from .source_operator import SourceOperator
+from .source_operator import SETTINGS, SourceOperator
 
 DEFAULT = ("DEFAULT", "Default", "Every setting of this section as it is at first")
 

@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parameters as Blender properties, and the effective values of an operator call."""
+"""Parameters as Blender properties, as options of the library, and with the defaults of older files."""
 
 import bpy
 
+from ..core.runtime import native
+from ..core.settings.parameters import TABLE, native_options
 from ..names import CONTEXT
+from .user_preferences import machine_options
+
+# Parameters as Blender properties, and the effective values of an operator call.
 
 listeners = {}  # {name of a property: function called with its group after a change}
 
@@ -122,3 +127,17 @@ def effective_value(name, group, operator):
     """One setting: the operator's argument if given, else the object's."""
     given = operator is not None and operator.properties.is_property_set(name)
     return getattr(operator if given else group, name)
+
+
+# Converts settings by name to the native library's options structs.
+
+
+def options_of(operation, values, machine=None):
+    """The native options of an operation of the table, from its settings and those of the machine.
+
+    Settings that the options struct lacks are left out. `machine`: machine_options() read earlier; None
+    reads the preferences, on the main thread only.
+    """
+    machine = machine_options() if machine is None else machine
+    options = getattr(native.library(), TABLE[operation]["struct"])
+    return options(**native_options(operation, {**values, **machine}))

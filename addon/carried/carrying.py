@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """All carried objects of a source during a session or job: read, moved on a worker, shown, restored."""
 
-from dataclasses import replace
+import contextlib
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,15 +10,106 @@ from ..blender import mesh_arrays, modifier_stack
 from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError, refuse
-from ..core.geometry.spaces import facing, transform, unflattened
+from ..core.geometry.spaces import facing, inverse, transform, unflattened
 from ..field_modifier import masks, motion
 from ..field_nodes import helper
 from . import refusals
-from .carried_objects import CarriedObject, CarriedPose, find, give_back, is_carried_otherwise
 from .carriers import MeshCarrier
+from .points import AttributeCarrier, KeyCarrier
 from .rest_bones import above_field
-from .transforms import BonesCarrier
-from .world_matrices import world_matrices
+from .transforms import BonesCarrier, TransformCarrier, base_kind_of
+from .world_matrices import hangs_on, world_matrices
+
+# A carried object during a session or job, and its release.
+
+KINDS = {"MESH": MeshCarrier, "ARMATURE": BonesCarrier}
+KINDS |= dict.fromkeys(("CURVES", "POINTCLOUD", "GREASEPENCIL"), AttributeCarrier)
+KINDS |= dict.fromkeys(("CURVE", "SURFACE", "LATTICE"), KeyCarrier)
+
+
+class CarriedObject:
+    """One object that the field moves as well."""
+
+    def __init__(self, context, entry):
+        item, self.way = entry.item, entry.way
+        self.reference = ObjectReference(item)
+        self.carrier = carrier_class(item, self.way)(context, item)
+        if isinstance(self.carrier, BonesCarrier):
+            self.carrier.take_base(item, entry)
+        self.may_be_edited = False
+        self.attached = None  # (points, PointsBefore, rest, PointsBeside, Attachment); worker only
+
+    def moves_by_itself(self, item):
+        """Whether its points move without an edit of its data."""
+        if isinstance(self.carrier, MeshCarrier):
+            return bool(modifier_stack.shown_before(item, in_place=True)) or item.data.shape_keys is not None
+        return isinstance(self.carrier, KeyCarrier) and item.data.shape_keys is not None
+
+    def item_and_entry(self, source):
+        """The object and its entry in the source's list; UserError if either was removed."""
+        item = self.reference.get()
+        entry = find(source, item)
+        if entry is None:
+            raise UserError("{name} is no longer carried", self.reference)
+        return item, entry
+
+
+@dataclass(frozen=True)
+class CarriedPose:
+    """A carried object's points, and (4, 4) matrices to solve space: at rest, now, and of its parent now."""
+
+    carried: CarriedObject
+    points: np.ndarray
+    rest: np.ndarray
+    now: np.ndarray
+    parent: np.ndarray
+
+    def same(self, other):
+        pairs = (self.rest, other.rest), (self.now, other.now), (self.parent, other.parent)
+        return self.points is other.points and all(np.array_equal(a, b) for a, b in pairs)
+
+
+def find(source, item):
+    """The entry of an object in a source's list, or None."""
+    return next((e for e in settings_of(source).carried if item is not None and e.item == item), None)
+
+
+def carrier_class(item, way):
+    return TransformCarrier if way == "RIGID" else KINDS.get(item.type, TransformCarrier)
+
+
+def release(source, index):
+    """Removes an object from a source's list and restores its shape from before it was carried."""
+    entry = settings_of(source).carried[index]
+    item = entry.item
+    if item is not None:
+        settings_of(item).carried_by = None
+        if item.library is None:
+            give_back(item, entry)
+    settings_of(source).carried.remove(index)
+
+
+def give_back(item, entry):
+    """Removes the field's modifier, keys and transforms from an object, whichever carrier wrote them."""
+    for carrier in dict.fromkeys((KINDS.get(item.type, TransformCarrier), TransformCarrier)):
+        carrier.release(item, entry)
+
+
+def is_carried_otherwise(item, entry, carrier):
+    """Whether an object still has the motion of another carrier."""
+    if base_kind_of(entry) not in ("NONE", carrier.base_kind):
+        return True
+    return isinstance(carrier, TransformCarrier) and KINDS.get(item.type, TransformCarrier).is_on(item)
+
+
+def give_back_all(source):
+    """Removes the field's motion from all carried objects of a source."""
+    for entry in settings_of(source).carried:
+        if entry.item is not None and entry.item.library is None:
+            give_back(entry.item, entry)
+
+
+# All carried objects of a source during a session or job: read, moved on a worker, shown, restored.
 
 written = set()  # session_uids of the objects that were moved in this file
 SAME_PLACE = 1e-6  # tolerance as a share of an object's size, as matrices are in single precision
@@ -118,7 +210,7 @@ class Carrying:
     def moved(self, af, samples, field, poses, strength=1.0, before=None):
         """[(CarriedObject, shape for its carrier)] moved by the field, scaled by `strength`.
 
-        `before`: PointsBefore of the source (surface/points_before.py), if its points may have moved.
+        `before`: PointsBefore of the source (surface/source_surface.py), if its points may have moved.
         """
         before = None if before is None or before.is_at_rest else before
         moved = [(pose.carried, self.moved_one(af, samples, field, pose, strength, before)) for pose in poses]
@@ -243,3 +335,38 @@ PAUSING = ("EDIT", "SCULPT", "SCULPT_CURVES", "EDIT_GREASE_PENCIL")  # modes in 
 
 def near(a, b):
     return np.allclose(a, b, rtol=0.0, atol=SAME_PLACE * max(1e-12, np.abs(a[:3, :3]).max()))
+
+
+# Keeps carried objects in place while a wrap fits the bones that they are parented to.
+
+
+def follow(context, source, shapes, fit):
+    """Calls `fit`, which moves rest bones of the source's armatures, and keeps the objects of `shapes`,
+    [(CarriedObject, shape that its carrier wrote)], in place."""
+    under = above_field(source)
+    found = [(carried, shape, carried.reference.find()) for carried, shape in shapes]
+    found = [one for one in found if one[2] is not None and hangs_on(one[2], under)]
+
+    def places():
+        depsgraph = depsgraph_of(context)
+        return [world_matrices(item, (), depsgraph, under=under) for *_, item in found]
+
+    before = places()
+    fit()
+    context.view_layer.update()
+    for (carried, shape, item), was, now in zip(found, before, places(), strict=True):
+        own, parent = inverse(now.now) @ was.now, inverse(now.parent) @ was.parent
+        with contextlib.suppress(UserError):  # reported when it was written first
+            carried.carrier.write(item, find(source, item), carried.carrier.rebased(shape, own, parent))
+
+
+def present(context, source):
+    """[(CarriedObject, its present shape)] for `follow`, without warnings."""
+    found = []
+    for entry in settings_of(source).carried:
+        with contextlib.suppress(UserError, ValueError):
+            refuse(refusals.of_entry(source, entry))
+            carried = CarriedObject(context, entry)
+            shape = carried.carrier.present(entry.item, entry)
+            found += [] if shape is None else [(carried, shape)]
+    return found

@@ -1,20 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Playback of baked hair, point clouds and Grease Pencil, for which Blender has no cache modifier.
-
-A mesh without faces, in no scene, holds the points; it plays the frames by a Mesh Cache modifier or by shape
-keys, and a nodes modifier on the object reads each point's position from it. It plays and renders without the
-extension. A point attribute holds the vertex index plus 1; points that are drawn later have none, and stay.
-"""
+"""Attribute collections with the points of hair curves, point clouds and Grease Pencil."""
 
 import bpy
 
 from ..blender import modifier_stack
-from ..blender.removal import remove_mesh_object, remove_node_modifier
+from ..blender.references import remove_mesh_object, remove_node_modifier
 from ..core.errors import UserError
 from ..field_modifier import cache_modifier, inputs
 from ..field_modifier.node_group import VECTORS, Graph, kept_group
 from ..names import CACHE_MODIFIER, PLAYED_GROUP, PLAYED_SUFFIX, ROWS
-from .drawings import layers_of
+
+
+def layers_of(item):
+    """The attribute collections that hold an object's points; Grease Pencil has one per drawing."""
+    if item.type != "GREASEPENCIL":
+        return [item.data.attributes]
+    drawings = [frame.drawing for layer in item.data.layers for frame in layer.frames]
+    return [drawing.attributes for drawing in drawings if "position" in drawing.attributes]
+
+
+# Playback of baked hair, point clouds and Grease Pencil, for which Blender has no cache modifier.
+#
+# A mesh without faces, in no scene, holds the points; it plays the frames by a Mesh Cache modifier or by
+# shape keys, and a nodes modifier on the object reads each point's position from it. It plays and renders
+# without the extension. A point attribute holds the vertex index plus 1; points that are drawn later have
+# none, and stay.
 
 VERSION = 1
 

@@ -5,13 +5,13 @@ import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack, undo_steps
 from ..blender.actions import remove_curves
-from ..blender.removal import remove_node_modifier
+from ..blender.references import remove_node_modifier
 from ..core.errors import UserError
 from ..field_modifier import cache_modifier, motion, node_group
 from ..names import FIELD_MODIFIER, OFFSETS, WARP_KEY
 from . import played_points
 from .carriers import Carrier
-from .drawings import layers_of
+from .played_points import layers_of
 
 BAKED_KEY = "ARAP Fields frame "  # prefix of baked keys of curves and lattices
 SURFACE_NODE = "GeometryNodeDeformCurvesOnSurface"  # node that moves hair with its surface

@@ -15,7 +15,7 @@ import numpy as np
 from ..blender import mesh_arrays
 from ..blender.object_references import is_source
 from ..core.errors import UserError
-from .export_check import is_whole
+from ..core.file_checks import are_whole_meshes
 from .parser import FORMATS
 
 NOTICED = 1e-6  # share of a mesh's size: a loss from single precision of which users are told
@@ -116,7 +116,7 @@ def write(path, items):
     text = None
     with whole_file(path) as partial:
         export(partial, items)
-        if not partial.is_file() or not is_whole(partial, [item.data for item in items]):
+        if not partial.is_file() or not are_whole_meshes(partial, [item.data for item in items]):
             raise not_whole(path)
         materials = partial.with_suffix(".mtl")
         if materials.exists():

@@ -10,7 +10,7 @@ import sys
 from ..core.errors import UserError, as_user_error
 from ..core.runtime import native
 from ..core.runtime.streams import open_streams
-from .launch import Launch, end_with_parent
+from .children import Launch, end_with_parent
 from .parser import parse
 
 

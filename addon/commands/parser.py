@@ -2,14 +2,67 @@
 """The verbs with flags and help; the flags of solves are made from the tables of parameters."""
 
 import argparse
+import math
 import re
+import sys
 from pathlib import Path, PurePath
 
-from ..core.settings.choices import BAKE_FORMATS, LIVE_KINDS, ORIENTATIONS, OUTPUTS, SKIN_GROUPS, SURFACES
+from ..core.settings.choices import (
+    BAKE_FORMATS,
+    LIVE_KINDS,
+    ORIENTATIONS,
+    OUTPUTS,
+    SKIN_GROUPS,
+    STYLES,
+    STYLIZE,
+    SURFACES,
+)
 from ..core.settings.parameters import DEFORM, EXTRACTION, QUALITIES, SKIN
-from ..core.settings.styles import STYLES, STYLIZE
-from .contact_flags import NAMES, add_contact_flags
-from .one_line import OneLineParser
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """An ArgumentParser that prints errors in one line, with exit code 2, and names the verb's help."""
+
+    def error(self, message):
+        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
+        raise SystemExit(2)
+
+    def parse_known_args(self, args=None, namespace=None):
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
+
+# Flags of contact: obstacles, ground and self-contact.
+
+NAMES = ("obstacle", "ground", "itself")
+
+
+def add_contact_flags(one):
+    group = one.add_argument_group("contact: what the surface does not pass [the object's own]")
+    group.add_argument(
+        "--obstacle",
+        action="append",
+        metavar="NAME[:MARGIN]",
+        help="an object of the .blend, or a mesh file, and the distance kept from it [0]; may be repeated",
+    )
+    group.add_argument("--ground", type=height, metavar="HEIGHT", help="a level ground, along z")
+    text = "parts of the shape do not pass each other"
+    group.add_argument("--itself", action=argparse.BooleanOptionalAction, default=None, help=text)
+
+
+def height(text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text!r} is no height")
+    return value
+
+
+# The verbs with flags and help; the flags of solves are made from the tables of parameters.
 
 FORMATS = ("ply", "obj", "stl", "blend")
 PARAMETERS = {"deform": DEFORM, "stylize": STYLIZE}

@@ -17,10 +17,10 @@ from ..blender.object_references import is_source, settings_of
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
 from ..core.runtime.threads import start_thread
-from ..core.settings.styles import style_identifier
+from ..core.settings.choices import style_identifier
 from ..handles import empties, naming
 from ..names import REPORT
-from . import contact_flags, files, touching
+from . import files, parser, touching
 from .parser import solve_settings
 
 CALLS = {"deform": bpy.ops.arapfields.deform, "stylize": bpy.ops.arapfields.stylize}
@@ -129,7 +129,7 @@ def solve(source, options):
     """Solves one object; returns ({"object", "status", "message", …}, (source, result) or None)."""
     call = CALLS[options.solve_verb]
     given = solve_settings(options)
-    for name in ("handles", *contact_flags.NAMES):
+    for name in ("handles", *parser.NAMES):
         given.pop(name, None)
     given |= {name: given[name].upper() for name in UPPER if name in given}
     if "style" in given:

@@ -11,7 +11,7 @@ import hashlib
 
 import bpy
 
-from ..blender import modifier_stack, timers, undo_steps
+from ..blender import host, modifier_stack, undo_steps
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..field_modifier import motion
@@ -107,4 +107,4 @@ def put_back(reference, before):
         return None
 
     if attempt() is not None:
-        timers.start(attempt, first=WAIT)
+        host.start(attempt, first=WAIT)

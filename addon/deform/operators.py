@@ -3,10 +3,9 @@ import bpy
 
 from ..blender.evaluation import world_matrix
 from ..blender.language import about
-from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
-from ..blender.property_definitions import annotations, effective_values
+from ..blender.property_definitions import annotations, effective_values, options_of
 from ..core.errors import UserError
 from ..core.runtime import native
 from ..core.settings.parameters import DEFORM, is_fast

@@ -26,7 +26,7 @@ from ..poses import applying
 from ..results import placement, visibility
 from ..results.placement import SolvedMesh, destination, placement_refusal
 from ..solver.source_reader import points_now, read_at_rest
-from ..surface.points_before import PointsBefore
+from ..surface.source_surface import PointsBefore
 from ..viewport.previews import Preview
 from .first_result import FirstResult
 

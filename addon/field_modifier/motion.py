@@ -14,7 +14,7 @@ import numpy as np
 from ..blender import mesh_arrays, modifier_stack, splat_layouts, undo_steps
 from ..blender.object_references import settings_of
 from ..blender.point_data import points_of
-from ..blender.removal import remove_mesh_object, remove_node_modifier, remove_unused_group
+from ..blender.references import remove_mesh_object, remove_node_modifier, remove_unused_group
 from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, SHAPE_OF
 from . import armatures, cache_modifier, inputs, masks, node_group

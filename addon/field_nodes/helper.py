@@ -14,7 +14,7 @@ from ..core.errors import UserError
 from ..core.geometry.spaces import inverse
 from ..core.runtime import native
 from ..names import FIELD_SUFFIX
-from .rows import AFFINE, FRAME, INSIDE, KERNEL, MAP, MOVE, NODE, PART, PLACE, SCALE
+from .node_group import AFFINE, FRAME, INSIDE, KERNEL, MAP, MOVE, NODE, PART, PLACE, SCALE
 
 
 def rows_of(field, local_to_solve, strength=1.0):

@@ -10,7 +10,7 @@ from mathutils import Matrix
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.evaluation import is_driven
 from ..blender.object_references import settings_of
-from ..core.geometry.box_fit import followed_box
+from ..core.geometry.handles import followed_box
 from ..core.geometry.spaces import inverse, transform
 from ..field_modifier import layers
 from . import empties, held_counts

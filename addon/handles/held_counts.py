@@ -6,12 +6,11 @@ Counts at once; for large meshes in Blender with a window, on a worker thread.
 
 import bpy
 
-from ..blender import mesh_arrays, modifier_stack, timers, vertex_groups
-from ..blender.host import has_window
+from ..blender import host, mesh_arrays, modifier_stack, vertex_groups
+from ..blender.host import has_window, redraw
 from ..blender.language import translated
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.point_data import points_of
-from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.geometry.handles import Handle
 from ..core.runtime import native
@@ -36,7 +35,7 @@ def count_inside(context, source, at_once=False):
     for entry in empties.used(source):
         entry.inside = -1
     pending[source.session_uid] = coroutine
-    timers.start(poll_counts, first=INTERVAL)
+    host.start(poll_counts, first=INTERVAL)
 
 
 def count_for(operator, context, source, at_once=False):

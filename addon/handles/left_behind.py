@@ -5,7 +5,7 @@ import functools
 
 import bpy
 
-from ..blender import timers
+from ..blender import host
 from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.object_references import in_scene, settings_of
@@ -28,7 +28,7 @@ def follow(context):
     """Checks whether objects were deleted; called after depsgraph updates."""
     count = len(context.view_layer.objects) if getattr(context, "view_layer", None) else 0
     if count < seen.get("count", 0) and has_window() and of_deleted():
-        timers.start(ask)
+        host.start(ask)
     seen["count"] = count
 
 

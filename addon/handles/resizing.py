@@ -5,9 +5,9 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..blender.guide import Guided
 from ..blender.object_references import owner_of, refusal, settings_of
 from ..blender.property_definitions import integer, number
+from ..blender.source_operator import Guided
 from ..core.errors import UserError
 from ..names import Op
 from . import empties, held_counts, movers

@@ -5,8 +5,8 @@ import time
 
 import bpy
 
-from ..blender import timers, user_preferences
-from ..blender.redraw import redraw
+from ..blender import host, user_preferences
+from ..blender.host import redraw
 from ..core.runtime.redraw_throttle import RedrawThrottle
 
 TICK = 0.03  # seconds between timer events
@@ -20,7 +20,7 @@ class Display:
         self._words, self._seen, self._left = "", None, 0.0
 
     def begin(self, context):
-        self._timer = timers.start_events(context, TICK)
+        self._timer = host.start_events(context, TICK)
         self._words, self._seen, self._left = "", None, time.monotonic()
         self._progress_throttle, self._preview_throttle = RedrawThrottle(0.25), RedrawThrottle(0.4)
 
@@ -61,7 +61,7 @@ class Display:
         """Removes the display when the job has ended, or when the extension is disabled."""
         self.clear_previews()
         if self._timer is not None:
-            timers.stop_events(self._timer)
+            host.stop_events(self._timer)
             for workspace in list(bpy.data.workspaces):
                 workspace.status_text_set(self.status or None)
             redraw(bpy.context, "UI", "WINDOW")

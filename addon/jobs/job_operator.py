@@ -4,14 +4,14 @@
 import types
 
 from ..blender import mesh_arrays, vertex_groups
-from ..blender.guide import Guided
 from ..blender.language import about, translated
 from ..blender.object_references import ObjectReference, is_source, owner_of, refusal, source_of
 from ..blender.property_definitions import choice
+from ..blender.source_operator import Guided
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
 from ..core.runtime.coroutines import Pause, run_to_completion
-from ..core.runtime.progress import JobCancelled
+from ..core.runtime.jobs import JobCancelled
 from ..core.settings.choices import SCOPES
 from .modal import ModalRun
 

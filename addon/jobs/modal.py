@@ -5,7 +5,7 @@ import bpy
 
 from ..blender.host import has_window
 from ..blender.language import translated
-from ..blender.scene_reference import SceneReference
+from ..blender.object_references import SceneReference
 from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..core.runtime.coroutines import step_for

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender.guide import Guided
 from ..blender.host import has_window
 from ..blender.language import translated
+from ..blender.source_operator import Guided
 from ..core.errors import UserError
 from ..core.runtime import jobs
 

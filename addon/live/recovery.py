@@ -5,7 +5,7 @@ import contextlib
 
 import bpy
 
-from ..blender import timers
+from ..blender import host
 from ..blender.language import translated
 from ..blender.object_references import in_scene, settings_of
 from ..carried import carrying
@@ -25,7 +25,7 @@ def after_undo():
     tag_written()
     recover(bring_back)
     if live.returning:
-        timers.start(poll_live, persistent=True)
+        host.start(poll_live, persistent=True)
 
 
 def after_load():

@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 import bpy
 
-from ..blender.host import has_window
+from ..blender.host import has_window, redraw
 from ..blender.object_references import settings_of
-from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.runtime.coroutines import run_to_completion, step_for
-from ..core.runtime.latest_request_worker import REST, LatestRequestWorker
+from ..core.runtime.threads import REST, LatestRequestWorker
 from ..field_modifier import layers, unseen
 from ..results import placement, visibility
 from ..solver import secondary_motion, style_settings

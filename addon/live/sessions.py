@@ -9,10 +9,10 @@ import contextlib
 
 import bpy
 
-from ..blender import modifier_stack, property_definitions, timers, undo_steps
+from ..blender import host, modifier_stack, property_definitions, undo_steps
+from ..blender.host import redraw
 from ..blender.language import about
 from ..blender.object_references import in_scene, settings_of
-from ..blender.redraw import redraw
 from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..field_modifier import layers
@@ -106,7 +106,7 @@ def begin(context, source, kind="DEFORM", keeps_shape=False, way=None):
     if session.display.in_place:
         layers.note(source, kind)
     live[source.session_uid] = session
-    timers.start(poll_live, persistent=True)
+    host.start(poll_live, persistent=True)
 
 
 def end_for_kind(context, source, kind):

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..blender import timers
+from ..blender import host
 from ..blender.language import translated
 from ..jobs.display import show_status
 from . import pins
@@ -61,7 +61,7 @@ class Status:
         self.text = text
         show_status(text)
         if text:
-            timers.start(watch, first=INTERVAL, persistent=True)
+            host.start(watch, first=INTERVAL, persistent=True)
 
     def clear(self):
         self.show("")

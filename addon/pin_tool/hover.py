@@ -9,7 +9,7 @@ from bpy_extras import view3d_utils
 from ..blender import mesh_arrays
 from ..blender.object_references import ObjectReference, settings_of, source_of
 from ..blender.splat_layouts import holds_splats
-from ..carried import carried_objects
+from ..carried import carrying
 from ..core.geometry.spaces import inverse, transform
 from ..field_modifier import motion
 from ..handles.empties import matrix_of
@@ -154,7 +154,7 @@ def carrier_of(item):
     """The visible mesh that carries an object without handles of its own, or None."""
     settings = settings_of(item)
     carrier = settings.carried_by
-    if carrier is None or carried_objects.find(carrier, item) is None or len(settings.handles):
+    if carrier is None or carrying.find(carrier, item) is None or len(settings.handles):
         return None
     return carrier if carrier.visible_get() and carrier.type == "MESH" and carrier.data.polygons else None
 

@@ -3,8 +3,8 @@
 
 import numpy as np
 
-from ..blender import timers
-from ..blender.redraw import redraw
+from ..blender import host
+from ..blender.host import redraw
 from ..blender.source_operator import ReportingOperator
 from ..core.errors import UserError
 from ..core.runtime import native
@@ -82,7 +82,7 @@ class Dragging(PinOperator):
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             if not self.drag.has_moved:
                 return self.end(context, {"FINISHED"})
-            self.timer = timers.start_events(context, TICK)
+            self.timer = host.start_events(context, TICK)
             sessions.update(context)
             return {"RUNNING_MODAL"}
         steps = reach_steps(event)
@@ -127,7 +127,7 @@ class Dragging(PinOperator):
 
     def leave(self, context, result):
         if self.timer is not None:
-            timers.stop_events(self.timer)
+            host.stop_events(self.timer)
             self.timer = None
         if hover.drag is self.drag:
             hover.clear()

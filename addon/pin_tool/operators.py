@@ -2,9 +2,9 @@
 import bpy
 import numpy as np
 
+from ..blender.host import redraw
 from ..blender.object_references import owner_of
 from ..blender.property_definitions import flag, number
-from ..blender.redraw import redraw
 from ..blender.selection import select_alone
 from ..core.errors import UserError
 from ..live import sessions

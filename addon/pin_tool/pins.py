@@ -5,11 +5,11 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..blender import modifier_kinds, modifier_stack, object_references, selection
+from ..blender import modifier_stack, object_references, selection
 from ..blender.language import translated
 from ..blender.object_references import owner_of, settings_of
 from ..blender.property_definitions import listeners
-from ..carried import carried_objects
+from ..carried import carrying
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix
 from ..core.geometry.spaces import inverse
@@ -123,7 +123,7 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
 def warn_of_moves(source):
     """Warns that a modifier after the field moves the clicked surface."""
     later = list(source.modifiers)[modifier_stack.place(source) + 1 :]
-    moving = [one for one in later if one.show_viewport and not modifier_kinds.follows_field(one)]
+    moving = [one for one in later if one.show_viewport and not modifier_stack.follows_field(one)]
     if moving:
         error = UserError(
             "{name}: the modifier {modifier} moves the shape after the field; the pin stands before that",
@@ -191,6 +191,6 @@ def remove(context, source, empty):
     sessions.end(context, source)
     motion.remove(source)
     layers.uncover(source)
-    carried_objects.give_back_all(source)
+    carrying.give_back_all(source)
     source.select_set(True)
     context.view_layer.objects.active = source

@@ -4,9 +4,17 @@
 from functools import partial
 
 from ..blender.property_definitions import annotations, choice
-from ..core.settings.choices import ORIENTATIONS, OUTPUTS, PLACEMENT_NUMBERS, PLACEMENTS, SURFACES
+from ..core.settings.choices import (
+    CUSTOM,
+    ORIENTATIONS,
+    OUTPUTS,
+    PLACEMENT_NUMBERS,
+    PLACEMENTS,
+    STYLES,
+    SURFACES,
+    style_identifier,
+)
 from ..core.settings.parameters import EXTRACTION, QUALITIES
-from ..core.settings.styles import CUSTOM, STYLES, style_identifier
 
 QUALITY_ITEMS = tuple((key, label, tip) for key, (label, tip, _) in QUALITIES.items())
 STYLE_ITEMS = tuple(

@@ -4,8 +4,8 @@
 import bpy
 
 from ..blender.property_definitions import flag, group_annotations, pointer, text
+from ..core.settings.choices import STYLIZE
 from ..core.settings.parameters import DEFORM, FIT, QUALITIES
-from ..core.settings.styles import STYLIZE
 from .choices import orientation, quality, style
 
 

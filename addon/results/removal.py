@@ -3,7 +3,7 @@
 
 from ..blender import modifier_stack
 from ..blender.object_references import settings_of
-from ..carried import carried_objects, rest_bones
+from ..carried import carrying, rest_bones
 from ..core.errors import UserError
 from ..field_modifier import layers, motion
 from ..field_nodes import helper
@@ -24,7 +24,7 @@ def take_off(context, source):
         reason = error
     motion.remove(source)
     layers.uncover(source)
-    carried_objects.give_back_all(source)
+    carrying.give_back_all(source)
     helper.clear(source)
     if followers is not None:
         followers.follow(context, source, back=True)

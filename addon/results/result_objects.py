@@ -9,7 +9,7 @@ import numpy as np
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.actions import key_at
 from ..blender.object_references import settings_of
-from ..blender.removal import remove_mesh_object
+from ..blender.references import remove_mesh_object
 from ..core.errors import UserError
 from ..field_modifier import motion
 from ..names import REPORT, RESULT_SUFFIX, RESULTS, WARP_KEY

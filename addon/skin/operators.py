@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Skinning: settings of the armature, the operator, the panel."""
+
 import bpy
 import numpy as np
 
 from ..blender.language import translated
-from ..blender.native_options import options_of
-from ..blender.object_references import ObjectReference, settings_of
-from ..blender.property_definitions import annotations, choice, effective_value, effective_values
+from ..blender.object_references import ObjectReference, settings_of, source_of
+from ..blender.property_definitions import annotations, choice, effective_value, effective_values, options_of
+from ..blender.section import Advanced, Section, draw_settings, job_button, note, settings_column
 from ..core.errors import UserError, refuse
 from ..core.runtime import native
 from ..core.runtime.coroutines import Pause
@@ -13,6 +15,7 @@ from ..core.runtime.jobs import Item
 from ..core.settings.choices import SKINNED
 from ..core.settings.parameters import SKIN
 from ..jobs.job_operator import JobOperator, busy
+from ..names import Op
 from . import rig as rigs
 from . import shapes, writing
 from .properties import groups
@@ -133,4 +136,44 @@ def names_of(items):
     return ", ".join(item.name for item in items)
 
 
-CLASSES = [ARAPFIELDS_OT_skin]
+class ARAPFIELDS_PT_skin(Section, bpy.types.Panel):
+    bl_label = "Skin"
+    bl_order = 5
+    tasks = frozenset({"RIG"})
+    needs_source = False
+
+    @classmethod
+    def poll(cls, context):
+        wanted = rigs.rig_of(context) is not None or source_of(context) is not None
+        return super().poll(context) and wanted
+
+    def fill(self, context, source, settings):
+        layout, rig = self.layout, rigs.rig_of(context)
+        meshes = rigs.meshes_of(context, rig, "SELECTED") if rig else []
+        if rig is not None:
+            group = settings_of(rig).skin
+            settings_column(layout, group, SKIN, advanced=False)
+            draw_settings(layout, group, "groups")
+        job_button(layout, Op.SKIN, "MOD_ARMATURE")
+        note(layout, rigs.refusal(rig, meshes))
+
+
+class ARAPFIELDS_PT_skin_settings(Advanced, bpy.types.Panel):
+    bl_label = "Skin Settings"
+    bl_order = 4
+    tasks = frozenset({"RIG"})
+    needs_source = False
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and rigs.rig_of(context) is not None
+
+    def fill(self, context, source, settings):
+        settings_column(self.layout, settings_of(rigs.rig_of(context)).skin, SKIN, advanced=True)
+
+
+CLASSES = [
+    ARAPFIELDS_OT_skin,
+    ARAPFIELDS_PT_skin,
+    ARAPFIELDS_PT_skin_settings,
+]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from mathutils.kdtree import KDTree
 
-from ..blender import mesh_arrays, modifier_kinds, modifier_stack, vertex_groups
+from ..blender import mesh_arrays, modifier_stack, vertex_groups
 from ..blender.object_references import ObjectReference
 from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import facing, inverse, is_in_place, space_of, transform
@@ -48,7 +48,7 @@ def place(item, rig):
     if found is not None:
         return found
     end = len(stack)
-    while end and modifier_kinds.follows_field(stack[end - 1]):
+    while end and modifier_stack.follows_field(stack[end - 1]):
         end -= 1
     return end
 
@@ -64,7 +64,7 @@ def read(context, item, rig, groups):
         painted_groups = {name: item.vertex_groups[name].index for name in painted.names(item)}
         stiffness = painted.of_weights(item, vertex_groups.weights_in(mesh, painted_groups))
     own = mesh_arrays.positions(item.data)
-    keeps = all(map(modifier_kinds.keeps_vertices, before)) and len(own) == len(arrays.vertices)
+    keeps = all(map(modifier_stack.kind_keeps_vertices, before)) and len(own) == len(arrays.vertices)
     return Shape(
         ObjectReference(item),
         arrays,

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..blender.native_options import options_of
+from ..blender.property_definitions import options_of
 from ..core.errors import UserError
 from ..core.geometry.edges import Topology
 from ..core.runtime import native
 from ..core.settings.parameters import presets
 from ..handles.native_handles import native_handles
-from ..surface.points_before import PointsBefore
+from ..surface.source_surface import PointsBefore
 from .contact import native_contact
 from .request import Request
 from .setup import at_samples

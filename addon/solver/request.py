@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..carried.carried_objects import CarriedPose
+from ..carried.carrying import CarriedPose
 from .contact import ContactTerm
 from .secondary_motion import SecondaryMotion
 

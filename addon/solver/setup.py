@@ -9,9 +9,9 @@ from ..blender import vertex_groups
 from ..blender.property_definitions import effective_values
 from ..core.geometry.edges import Topology
 from ..core.runtime import native
-from ..core.runtime.progress import ProgressTracker
+from ..core.runtime.jobs import ProgressTracker
+from ..core.settings.choices import STYLIZE
 from ..core.settings.parameters import DEFORM
-from ..core.settings.styles import STYLIZE
 from ..surface.source_surface import SourceSurface
 
 SAMPLES = 6000

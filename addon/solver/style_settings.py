@@ -10,7 +10,7 @@ from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
 from ..core.errors import UserError
 from ..core.geometry.spaces import pose, upright
-from ..core.settings.styles import CUSTOM, style_name
+from ..core.settings.choices import CUSTOM, style_name
 from ..handles import empties
 from ..handles.empties import matrix_of
 from . import style_object

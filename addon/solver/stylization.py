@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..blender import vertex_groups
-from ..blender.native_options import options_of
+from ..blender.property_definitions import options_of
 from ..core.runtime import native
 from ..handles.native_handles import held_points, native_handles
 from .contact import ContactTerm, native_contact

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Painted stiffness: a source's settings, presets, the panel."""
+
 import bpy
 
 from ..blender import vertex_groups
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import choice
+from ..blender.section import Advanced, group_row, note
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
+from ..names import Op
+from . import painted
 from .painted import PRESETS
 
 
@@ -36,4 +41,21 @@ class ARAPFIELDS_OT_stiffness_preset(SourceOperator, bpy.types.Operator):
         settings.times, settings.bend_times = PRESETS[self.material][2]
 
 
-CLASSES = [ARAPFIELDS_OT_stiffness_preset]
+class ARAPFIELDS_PT_stiffness(Advanced, bpy.types.Panel):
+    bl_label = "Painted Stiffness"
+    bl_order = 4
+    tasks = frozenset({"POSE"})
+
+    def fill(self, context, source, settings):
+        layout, group = self.layout, settings.stiffness
+        layout.operator_menu_enum(Op.STIFFNESS_PRESET, "material", icon="PRESET")
+        group_row(layout, group, "group", source, "times")
+        group_row(layout, group, "bend_group", source, "bend_times")
+        group_row(layout, group, "mask", source)
+        note(layout, painted.refusal(source))
+
+
+CLASSES = [
+    ARAPFIELDS_OT_stiffness_preset,
+    ARAPFIELDS_PT_stiffness,
+]

@@ -9,8 +9,8 @@ from ..blender.property_definitions import annotations, effective_values
 from ..blender.source_operator import SourceOperator
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
+from ..core.settings.choices import STYLIZE
 from ..core.settings.parameters import is_fast
-from ..core.settings.styles import STYLIZE
 from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..handles import empties
 from ..properties.choices import orientation, result_properties, style

@@ -13,7 +13,7 @@ from ..blender.section import (
     presets,
     settings_column,
 )
-from ..core.settings.styles import CUSTOM, STYLIZE
+from ..core.settings.choices import CUSTOM, STYLIZE
 from ..live.panel import live_buttons, playback_progress, result_row
 from ..names import Op
 from ..properties.choices import STYLE_ITEMS

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..core.geometry.clustering import cluster_vertices, vertex_normals
+from ..core.geometry.edges import cluster_vertices, vertex_normals
 
 COLOUR = np.array([0.98, 0.60, 0.22], dtype=np.float32)
 LIGHT = np.array([0.3, -0.5, 0.81], dtype=np.float32)

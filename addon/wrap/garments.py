@@ -1,26 +1,89 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fits copies of a wrapped object's carried clothes and props to the target, at the same distance."""
+"""Copies of a source's armatures, clothes and props for a target."""
 
 import numpy as np
 from mathutils import Matrix
 
-from ..blender import mesh_arrays, modifier_stack
-from ..blender.actions import remove_curves
+from ..blender import mesh_arrays, modifier_stack, references
+from ..blender.actions import own_action, remove_curves
 from ..blender.evaluation import depsgraph_of, with_ancestors
 from ..blender.object_references import in_scene, settings_of
 from ..carried import refusals
-from ..carried.carried_objects import carrier_class
+from ..carried.carrying import carrier_class
 from ..carried.rest_bones import above_field
 from ..carried.transforms import TransformCarrier
 from ..carried.world_matrices import array, at_present_rest, world_matrices
 from ..core.errors import UserError, refuse
-from ..core.geometry import fitting
+from ..core.geometry import transfer
 from ..core.geometry.spaces import facing, inverse, transform
 from ..core.runtime import native
 from ..field_modifier import motion
 from ..handles.empties import matrix_of
 from ..names import COPY_OF
-from . import rigs
+
+# Copies of a source's armatures and carried objects for a target, and their references.
+
+
+def pairs(source, target):
+    """{armature of the source: that of the target}, by modifiers of the same name."""
+    both = [(given, target.modifiers.get(given.name)) for given in source.modifiers]
+    rigs = [[one and modifier_stack.rig_of(one) for one in pair] for pair in both]
+    return {own: other for own, other in rigs if own is not None and other is not None}
+
+
+def counterparts(source, target):
+    """{data-block of the source: the target's}: of both objects and of the armatures that pose them."""
+    found = blocks(source, target)
+    for given, there in pairs(source, target).items():
+        found |= blocks(given, there)
+    return found
+
+
+def blocks(given, there):
+    """{data-block: its counterpart} of two objects, their data and their shape keys, if both have any."""
+    both = [(given, there), (given.data, there.data)]
+    both.append([getattr(item.data, "shape_keys", None) for item in (given, there)])
+    return {one: other for one, other in both if one is not None and other is not None}
+
+
+def copied_object(item, target):
+    """A copy with data and actions of its own at the same place, in the target's collections."""
+    own = item.copy()
+    if item.data is not None:
+        own.data = item.data.copy()
+    own.name = f"{item.name} {target.name}"
+    for block in blocks(item, own).values():
+        own_action(block)
+    settings_of(own).rest_bones = ""  # its bones are not fitted
+    for home in target.users_collection:
+        home.objects.link(own)
+    return own
+
+
+def remap_copies(made, twins):
+    """Replaces references of copies, {object: its copy}, to one another and by `twins`, {data-block: its
+    counterpart}."""
+    copies = {}
+    for given, there in made.items():
+        copies |= blocks(given, there)
+    for block in copies.values():
+        references.remap(references.parts_of(block), twins | copies)
+
+
+def copy_drivers(source, target):
+    """Copies the drivers of the source's keys; references to the source become those to its counterpart."""
+    given, keys = source.data.shape_keys, target.data.shape_keys
+    if given.animation_data is None:
+        return
+    twins = counterparts(source, target)
+    for curve in given.animation_data.drivers:
+        if keys.animation_data is not None and keys.animation_data.drivers.find(curve.data_path):
+            keys.driver_remove(curve.data_path)
+        made = keys.animation_data_create().drivers.from_existing(src_driver=curve)
+        references.remap(references.read_by(made), twins)
+
+
+# Fits copies of a wrapped object's carried clothes and props to the target, at the same distance.
 
 PLACING = ("location", "rotation_", "scale", "delta_")  # data paths of transform channels
 
@@ -33,12 +96,12 @@ def copies(context, source, target, given, own):
     """
     world, there = matrix_of(source), matrix_of(target)
     wrapped, onto = (facing(triangles, there) for triangles in (given.triangles, own[1]))
-    body = fitting.Body(
+    body = transfer.Body(
         native.library(),
         (transform(world, given.rest), transform(world, given.moved), wrapped),
         (transform(there, own[0]), onto),
     )
-    twins, made, notes = rigs.counterparts(source, target), {}, []
+    twins, made, notes = counterparts(source, target), {}, []
     posing = {rig: twins[rig] for rig in above_field(source) if rig in twins}
     for entry in settings_of(source).carried:
         item = entry.item
@@ -58,7 +121,7 @@ def copies(context, source, target, given, own):
             continue
         made[item] = copy_of(item, target, posing)
         put(context, made[item], target, matrix, shape, posing)
-    rigs.remap_copies(made, twins)
+    remap_copies(made, twins)
     return len(made), notes
 
 
@@ -106,7 +169,7 @@ def copy_of(item, target, posing):
         for child in parent.children:
             if child.get(COPY_OF) == item.name:
                 return child
-    copied = rigs.copied(item, target)
+    copied = copied_object(item, target)
     if item.type == "MESH":
         motion.discard(copied)
     copied[COPY_OF] = item.name

@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_kinds, modifier_stack
+from ..blender import mesh_arrays, modifier_stack
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.errors import UserError
 from ..core.geometry.spaces import is_in_place, mirrors, transform
@@ -13,7 +13,7 @@ from ..core.runtime import native
 from ..handles.empties import matrix_of
 from ..names import NEUTRAL_KEY
 from . import keys
-from .given import Given
+from .transfer import Given
 
 LEAST_POSE = 1e-5  # of the target's size: above the rounding of an armature at rest
 FAR = 0.05  # of the target's diagonal: most median distance after a wrap
@@ -22,7 +22,7 @@ LOOKED_AT = 1000  # most vertices to measure the distance of two surfaces
 
 
 def keeps_vertices(modifier):
-    return modifier_kinds.keeps_vertices(modifier) or modifier_stack.is_field(modifier)
+    return modifier_stack.kind_keeps_vertices(modifier) or modifier_stack.is_field(modifier)
 
 
 def seen(context, source, target, is_posed):

@@ -7,12 +7,11 @@ import numpy as np
 from ..blender.evaluation import world_matrix
 from ..blender.host import has_window
 from ..blender.language import about, translated
-from ..blender.native_options import options_of
 from ..blender.object_references import settings_of
 from ..blender.presets import preset_classes
-from ..blender.property_definitions import annotations, effective_value, effective_values, integer
+from ..blender.property_definitions import annotations, effective_value, effective_values, integer, options_of
 from ..blender.source_operator import SourceOperator
-from ..carried import hanging, rest_bones
+from ..carried import carrying, rest_bones
 from ..core.errors import UserError, refuse
 from ..core.geometry.handles import nothing_held
 from ..core.geometry.spaces import space_of
@@ -113,7 +112,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
             for one in below:
                 one.kept = True
             if fitting is not None:
-                hanging.follow(context, source, solved[0].carried, lambda: fitting.put(context))
+                carrying.follow(context, source, solved[0].carried, lambda: fitting.put(context))
             followers.follow(context, source)
             empty = empties.holding_nothing(source)
             self.warnings += [about(source.name, nothing_held(empty))] if empty else []
@@ -185,8 +184,8 @@ class ARAPFIELDS_OT_reset_bones(SourceOperator, bpy.types.Operator):
         return None if rest_bones.fitted(source) else UserError("No bones were fitted to {name}", source)
 
     def change(self, context, source):
-        shapes = hanging.present(context, source)
-        hanging.follow(context, source, shapes, lambda: rest_bones.reset(context, source))
+        shapes = carrying.present(context, source)
+        carrying.follow(context, source, shapes, lambda: rest_bones.reset(context, source))
 
 
 class ARAPFIELDS_OT_transfer(JobOperator, bpy.types.Operator):

@@ -10,19 +10,18 @@ import numpy as np
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.host import has_window
 from ..blender.language import about, translated
-from ..blender.native_options import options_of
 from ..blender.object_references import ObjectReference, in_scene, settings_of
-from ..blender.property_definitions import effective_values, number, path_text
-from ..blender.removal import remove_modifier
+from ..blender.property_definitions import effective_values, number, options_of, path_text
+from ..blender.references import remove_modifier
 from ..core.errors import UserError, refuse
-from ..core.geometry import fitting
+from ..core.geometry import transfer
 from ..core.geometry.spaces import facing, transform
 from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..core.settings.parameters import WRAP
 from ..handles.empties import matrix_of
 from ..jobs.job_operator import JobOperator
-from . import garments, landmarks, rigs
+from . import garments, landmarks
 from .properties import onto
 
 FAR = 0.02  # of the target's diagonal: most median distance of a body that a saved field moves
@@ -77,7 +76,7 @@ class ARAPFIELDS_OT_refit(JobOperator, bpy.types.Operator):
             item = garment.unchanged()
             made[item] = garments.copy_of(item, target, posing)
             garments.put(context, made[item], target, np.array(made[item].matrix_world), shape, posing)
-        rigs.remap_copies(made, rigs.counterparts(source, target) | posing)
+        garments.remap_copies(made, garments.counterparts(source, target) | posing)
         for copied in made.values():
             for modifier in [one for one in copied.modifiers if modifier_stack.rig_of(one) is not None]:
                 if modifier.object not in posing.values():
@@ -128,7 +127,7 @@ def pairs_of(source):
 
 def posing_rigs(source, target):
     """{armature of the source: the target's}: by modifiers of one name, or where each has a single one."""
-    pairs = rigs.pairs(source, target)
+    pairs = garments.pairs(source, target)
     own, other = (
         [rig for one in item.modifiers if (rig := modifier_stack.rig_of(one))] for item in (source, target)
     )
@@ -188,7 +187,7 @@ class Refit:
         self.solid = af.MeshSdf(*target.surface)
         field = self.field(af, samples, tracker)
         moved = field(body.vertices)
-        fit = fitting.Body(af, (body.vertices, moved, body.triangles), target.surface)
+        fit = transfer.Body(af, (body.vertices, moved, body.triangles), target.surface)
         shapes = []
         for done, garment in enumerate(self.worn):
             task = tracker.start(garment.reference.name, 1 / (len(self.worn) - done))
@@ -227,7 +226,7 @@ class Refit:
             if not lack.any():
                 return shape
             push = lack[:, None] * self.solid.gradient(shape)
-            around = fitting.smoothed(push, edges) if done < SMOOTH else push
+            around = transfer.smoothed(push, edges) if done < SMOOTH else push
             shape = shape + np.where(lack[:, None] > 0, push, around)
         if count := np.count_nonzero(self.solid(shape) < 0.0):
             left = UserError("{count} vertices are inside of the target", count=count)

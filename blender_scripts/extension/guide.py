@@ -6,7 +6,7 @@ import io
 import re
 from pathlib import Path
 
-FOLDER = "guide"  # in the extension; read by addon/blender/guide.py
+FOLDER = "guide"  # in the extension; read by addon/blender/source_operator.py
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{title} · ARAP Fields</title>
 <style>body {{ font: 16px/1.5 sans-serif; max-width: 50em; margin: 2em auto; padding: 0 1em }}

@@ -13,10 +13,9 @@ from pathlib import Path
 import pytest
 from support.programs.batches import FakeLaunch, batch, make_folders, starts, statuses
 
-from addon.commands.batch import flags, plan, run_batch
+from addon.commands.batch import Record, described, differences, flags, plan, run_batch
 from addon.commands.children import Children, understand
 from addon.commands.parser import parse, solve_settings
-from addon.commands.record import Record, described, differences
 from addon.core.errors import UserError
 
 # The batch without Blender: which files, what is done already, what became of a child; and the flags.
@@ -210,7 +209,7 @@ def test_names_of_any_length_and_letters_are_noted(tmp_path):
 def test_an_input_is_claimed_by_one_process_until_it_ends(tmp_path):
     code = (
         f"import sys, time; sys.path.insert(0, {str(ROOT)!r})\n"
-        "from addon.commands.record import Record\n"
+        "from addon.commands.batch import Record\n"
         "record = Record(sys.argv[1]); print(record.claim('a.ply'), flush=True); time.sleep(60)\n"
     )
     other = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE, text=True)
@@ -235,8 +234,8 @@ def test_children_end_with_a_parent_that_is_killed(tmp_path):
     """Two at once: each holds a lock for as long as it lives."""
     child = (
         f"import sys, time; sys.path.insert(0, {str(ROOT)!r})\n"
-        "from addon.commands.launch import end_with_parent\n"
-        "from addon.commands.record import Record\n"
+        "from addon.commands.children import end_with_parent\n"
+        "from addon.commands.batch import Record\n"
         "end_with_parent(); record = Record(sys.argv[1])\n"
         "while not record.claim(sys.argv[2]): time.sleep(0.01)\n"
         "time.sleep(600)\n"
@@ -348,7 +347,7 @@ def test_inputs_abandoned_by_another_batch_are_done(many, capsys):
         path.unlink()
     code = (
         f"import sys, time; sys.path.insert(0, {str(ROOT)!r})\n"
-        "from addon.commands.record import Record\n"
+        "from addon.commands.batch import Record\n"
         "record = Record(sys.argv[1]); print(record.claim('slow00.ply'), flush=True); time.sleep(2)\n"
     )
     other = subprocess.Popen([sys.executable, "-c", code, many / "out"], stdout=subprocess.PIPE, text=True)

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from addon.commands.export_check import is_whole
+from addon.core.file_checks import are_whole_meshes
 
 CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1)]
 FACES = [(0, 1, 2, 3), (0, 1, 4), (1, 2, 4)]
@@ -34,19 +34,19 @@ def obj():
 def test_truncated_files_are_incomplete(name, tmp_path):
     content, path = {"ply": ply, "stl": stl, "obj": obj}[name](), tmp_path / f"x.{name}"
     path.write_bytes(content)
-    assert is_whole(path, [MESH])
+    assert are_whole_meshes(path, [MESH])
     for length in range(len(content)):
         path.write_bytes(content[:length])
-        assert not is_whole(path, [MESH]), length
+        assert not are_whole_meshes(path, [MESH]), length
     path.write_bytes(content)
-    assert not is_whole(path, [MESH, MESH])
+    assert not are_whole_meshes(path, [MESH, MESH])
 
 
 def test_materials_belong_to_an_obj(tmp_path):
     path, materials = tmp_path / "x.obj", tmp_path / "x.mtl"
     path.write_bytes(obj())
     materials.write_text("newmtl skin\nKd 1 1 1\n")
-    assert is_whole(path, [MESH])
+    assert are_whole_meshes(path, [MESH])
     for text in ("newmtl skin\nKd 1", "newmtl other\n", ""):
         materials.write_text(text)
-        assert not is_whole(path, [MESH])
+        assert not are_whole_meshes(path, [MESH])

@@ -6,7 +6,7 @@ import pytest
 from support.geometry.meshes import sphere
 
 import arapfields as af
-from addon.core.geometry import fitting
+from addon.core.geometry import transfer
 
 DISTANCE = 0.02  # of clothes from a ball of radius 1
 CLOSE = 0.2  # of that
@@ -21,7 +21,7 @@ def ball():
 
 def test_clothes_keep_their_distance_after_a_wrap(ball):
     v, f = ball
-    body = fitting.Body(af, (v, v, f), (v, f))
+    body = transfer.Body(af, (v, v, f), (v, f))
     for left in (-0.5, 0.2):
         shape = body.fit((1 + DISTANCE) * v, (1 + left * DISTANCE) * v, f)
         assert np.abs(af.MeshSdf(v, f)(shape) / DISTANCE - 1).max() < CLOSE
@@ -30,7 +30,7 @@ def test_clothes_keep_their_distance_after_a_wrap(ball):
 def test_points_far_from_the_skin_follow_the_wrap(ball):
     """A body that grows to four times its size: a hat that does not need not be pushed away."""
     v, f = ball
-    body = fitting.Body(af, (v / 4, v, f), (v, f))
+    body = transfer.Body(af, (v / 4, v, f), (v, f))
     hat = 1.3 * v
     assert np.abs(body.fit(0.75 * v, hat, f) - hat).max() < STILL
 
@@ -39,7 +39,7 @@ def test_where_the_other_body_has_a_gap_clothes_stay(ball):
     """As under an avatar's clothes, where its skin is removed."""
     v, f = ball
     kept = (v[f] @ [0, 0, 1]).max(axis=1) < 0.3
-    body = fitting.Body(af, (v, v, f), (v, f[kept]))
+    body = transfer.Body(af, (v, v, f), (v, f[kept]))
     worn = (1 + DISTANCE) * v
     shape, above = body.fit(worn, worn, f), v[:, 2] > 0.7
     assert np.abs(shape - worn)[above].max() < STILL
@@ -48,7 +48,7 @@ def test_where_the_other_body_has_a_gap_clothes_stay(ball):
 def test_clothes_whose_vertices_are_split_at_seams_stay_closed():
     """As game formats write them: each triangle by itself. They go where the joined ones go."""
     v, f = sphere(1.0, 4)
-    body = fitting.Body(af, (v, v, f), (v, f))
+    body = transfer.Body(af, (v, v, f), (v, f))
     near = 1 + DISTANCE * (0.2 + 0.1 * np.sin(9 * v))
     joined = body.fit((1 + DISTANCE) * v, near * v, f)
     split = body.fit(

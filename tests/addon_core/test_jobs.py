@@ -11,10 +11,15 @@ import pytest
 from addon.core.errors import UserError
 from addon.core.runtime import jobs
 from addon.core.runtime.coroutines import Finished, Pause, run_to_completion, step_for
-from addon.core.runtime.latest_request_worker import LatestRequestWorker
-from addon.core.runtime.progress import ProgressTracker
+from addon.core.runtime.jobs import ProgressTracker
 from addon.core.runtime.redraw_throttle import RedrawThrottle
-from addon.core.runtime.threads import NICENESS, lower_thread_priority, own_threads, start_thread
+from addon.core.runtime.threads import (
+    NICENESS,
+    LatestRequestWorker,
+    lower_thread_priority,
+    own_threads,
+    start_thread,
+)
 
 # Jobs: outcomes in order, failures kept apart, progress that never falls, cancel and join.
 

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from addon.core.errors import UserError
-from addon.core.geometry import rotations, uv_transfer
-from addon.core.geometry.edge_paths import carried_marks
+from addon.core.geometry import rotations, transfer
 from addon.core.geometry.edges import build_edges
 from addon.core.geometry.handles import box_matrix, require_held, solve_handle
 from addon.core.geometry.spaces import inverse, pose, rigid_motion, space_of, transform, upright
+from addon.core.geometry.transfer import carried_marks
 
 # Solve space and handles: the world up to a similarity, rigid motions under any scale, mirror and parent.
 
@@ -224,14 +224,14 @@ def test_a_face_across_a_seam_keeps_the_texture_of_its_centre():
     uv = source[triangles][:, :, :2] + right[:, None, None] * [5.0, 0.0]
     vertices, _, faces = grid(5, 3)
     corners, starts = faces.ravel(), 4 * np.arange(len(faces))
-    points, _, face = uv_transfer.fan(vertices, starts, corners)
+    points, _, face = transfer.fan(vertices, starts, corners)
     centres = source[triangles].mean(axis=1)
     places = ((points[:, None] - centres) ** 2).sum(-1).argmin(1)
     edges = np.stack([source[triangles][:, k] for k in range(3)], axis=2)[places]
     shares = np.linalg.solve(
         edges + [[0], [0], [1]] * np.ones((1, 3, 3)), (points + np.eye(3)[2])[:, :, None]
     )
-    found, beyond = uv_transfer.corner_coordinates(
+    found, beyond = transfer.corner_coordinates(
         points, places, shares[:, :, 0], corners, face, source[triangles], uv
     )
     across = points[len(vertices) :][face][:, 0] > 0.5

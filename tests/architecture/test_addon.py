@@ -52,13 +52,13 @@ UPWARD = {  # (module, what it imports of a later folder): why
 LEAVES = ("operators", "panel")
 ALONE = {  # text of a call → the one module that makes it
     "Thread(": "core/runtime/threads.py",
-    "app.timers.register": "blender/timers.py",
-    "event_timer_add": "blender/timers.py",
+    "app.timers.register": "blender/host.py",
+    "event_timer_add": "blender/host.py",
     "draw_handler_add": "lifecycle.py",
     "bpy.app.handlers,": "lifecycle.py",
     "from bpy.app.handlers": "lifecycle.py",
-    "translations.register": "blender/translations.py",
-    "polib": "blender/translations.py",
+    "translations.register": "blender/language.py",
+    "polib": "blender/language.py",
     "register_class": "registration.py",
     "threading.enumerate": "core/runtime/threads.py",
     "status_text_set": "jobs/display.py",
@@ -69,11 +69,11 @@ CHANGES |= {"setdefault", "appendleft"}
 ENDED_ELSEWHERE = {  # state that the lifecycle's STATE does not list, and why
     "icons._collections": "icons.clear, one of the lifecycle's PARTS",
     "icons._drawn": "icons.clear",
-    "guide.pages": "guide.unregister, by menus.end",
+    "source_operator.pages": "guide.unregister, by menus.end",
     "__init__._registered": "commands.unregister, one of the lifecycle's PARTS",
     "lifecycle._begun": "lifecycle.unregister itself",
     "lifecycle._drawn": "lifecycle.unregister itself",
-    "timers._started": "timers.clear, by STATE, which lists the module",
+    "host._started": "timers.clear, by STATE, which lists the module",
     "selection.rows": "a flag that is down whenever no row is being chosen",
     "native._state": "the library, which a process loads once",
     "undo_steps.is_between": "set within a context manager alone",
@@ -178,7 +178,7 @@ def test_nothing_is_done_that_crashes_blender():
     texts = {name(path): path.read_text() for path in modules()}
     assert not [one for one, text in texts.items() if ".temp_override(" in text]
     asking = {one for one, text in texts.items() if "evaluated_depsgraph_get()" in text}
-    assert asking == {"blender/evaluation.py", "pin_tool/hover.py", "wrap/clicking.py"}, asking
+    assert asking == {"blender/evaluation.py", "pin_tool/hover.py", "wrap/landmark_tools.py"}, asking
 
 
 def names_of(node):

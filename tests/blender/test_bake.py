@@ -22,8 +22,7 @@ if IN_BLENDER:
     from support.blender.riders import rider
     from support.blender.stacks import add_modifier, armature, local_points
 
-    import addon.animation.bake_job as bake_job
-    from addon.animation import caches, played
+    from addon.animation import bake_job, caches
     from addon.blender import modifier_stack
     from addon.blender.actions import curves_of
     from addon.core.runtime import jobs
@@ -155,9 +154,9 @@ def test_a_bake_plays_at_the_scenes_frames_also_where_these_are_remapped(format,
         path = str(tmp_path / f"bar.{format.lower()}")
     bar.arapfields.bake.range = "HANDLES"
     assert bpy.ops.arapfields.bake(format=format, filepath=path) == {"FINISHED"}
-    played = bar if path else bpy.data.objects["Bar_baked"]
+    caches = bar if path else bpy.data.objects["Bar_baked"]
     for frame, points in expected.items():
-        assert np.abs(at(played, frame) - points).max() < EXACT
+        assert np.abs(at(caches, frame) - points).max() < EXACT
         values = {key.name.split()[-1]: key.value for key in cord.data.shape_keys.key_blocks[1:]}
         assert values.pop(str(frame)) == 1.0 and not any(values.values())
     assert len(values) == (8 if new == 200 else 3)
@@ -360,16 +359,16 @@ def test_modifiers_that_make_other_vertices_as_frames_pass_are_named():
 def test_a_bake_that_no_longer_fits_is_named():
     bar, folder = saved_animation()
     assert bpy.ops.arapfields.bake(range="HANDLES") == {"FINISHED"}
-    assert played.record_of(bar)["frames"] == 5 and played.problem(bar, look_closely=True) is None
+    assert caches.record_of(bar)["frames"] == 5 and caches.problem(bar, look_closely=True) is None
     bar.data.vertices[0].co.x += 0.1
-    assert "mesh changed since the bake" in str(played.problem(bar, look_closely=True))
+    assert "mesh changed since the bake" in str(caches.problem(bar, look_closely=True))
     bar.data.vertices[0].co.x -= 0.1
     (folder / "cache/scene~Scene~Bar.pc2").rename(folder / "cache/moved.pc2")
-    assert "is not there" in str(played.problem(bar))
+    assert "is not there" in str(caches.problem(bar))
     bar.modifiers[0].filepath = "//cache/moved.pc2"
     content = (folder / "cache/moved.pc2").read_bytes()
     (folder / "cache/moved.pc2").write_bytes(content[:-1])
-    assert "bytes" in str(played.problem(bar, look_closely=True))
+    assert "bytes" in str(caches.problem(bar, look_closely=True))
 
 
 @pytest.mark.parametrize("kind", ["deleted", "changed"])
@@ -613,10 +612,10 @@ def test_carried_objects_keep_apart_from_objects_of_both_names():
         saved_animation(name, folder)
     scenes.activate(*(bpy.data.objects[name] for name in ("Bar", "Bar Hat", "Bar~Hat")))
     baked(scope="SELECTED")
-    played = [
+    caches = [
         modifier_stack.find_cache(bpy.data.objects[n]).filepath for n in ("Bar", "Hat", "Bar Hat", "Bar~Hat")
     ]
-    assert len(set(played)) == 4 == len(list((folder / "cache").iterdir()))
+    assert len(set(caches)) == 4 == len(list((folder / "cache").iterdir()))
     for name in ("Bar", "Hat"):
         bpy.data.objects[name].name = f"Old {name}"
     content = {path: path.read_bytes() for path in (folder / "cache").iterdir()}

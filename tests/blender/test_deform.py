@@ -19,7 +19,7 @@ if IN_BLENDER:
     from support.blender.wraps import rigged_bar
 
     from addon import lifecycle
-    from addon.blender import modifier_stack, timers
+    from addon.blender import host, modifier_stack
     from addon.core.geometry.spaces import space_of, unflattened
     from addon.core.runtime import jobs, threads
     from addon.deform import solve_job
@@ -28,8 +28,7 @@ if IN_BLENDER:
     from addon.live import sessions
     from addon.names import OFFSETS
     from addon.solver import setup
-    from addon.surface.points_before import PointsBefore
-    from addon.surface.source_surface import read_surface
+    from addon.surface.source_surface import PointsBefore, read_surface
 
 pytestmark = pytest.mark.in_blender
 
@@ -303,11 +302,11 @@ def test_a_first_result_waits_for_the_end_of_edit_mode():
     bpy.ops.object.mode_set(mode="EDIT")
     first.show(first.points.astype("f4"))
     first.clear()
-    (waiting,) = [function for function in timers.running() if function.__name__ == "attempt"]
+    (waiting,) = [function for function in host.running() if function.__name__ == "attempt"]
     assert waiting() > 0
     bpy.ops.object.mode_set(mode="OBJECT")
     assert waiting() is None
-    timers.clear()
+    host.clear()
     assert state(bar) == before
 
 

@@ -23,7 +23,7 @@ if IN_BLENDER:
     from support.blender.panels import Layout
     from support.blender.riders import rider
 
-    from addon.animation import bake_operator, export_operators, exporters, operators
+    from addon.animation import bake_job, exporters, operators
     from addon.animation.properties import ARAPFIELDS_PG_bake
     from addon.blender import property_definitions
     from addon.core.errors import UserError
@@ -287,7 +287,7 @@ def menu_rows():
             self.__dict__[name] = value
 
     stand_in = types.SimpleNamespace(layout=Row([]))
-    export_operators.ARAPFIELDS_MT_export.draw(stand_in, bpy.context)
+    exporters.ARAPFIELDS_MT_export.draw(stand_in, bpy.context)
     return rows
 
 
@@ -295,9 +295,9 @@ def test_a_press_overwrites_only_what_is_the_objects_own_or_confirmed():
     """A script confirms a bake by an argument, an export by its call."""
     folder = five_frames()
     cache, file, asked = folder / "a.pc2", folder / "a.glb", []
-    has_window, ask = bake_operator.has_window, bake_operator.ask
-    bake_operator.has_window, bake_operator.ask = lambda: True, lambda *given: asked.append(given[-1])
-    bake, export = operators.ARAPFIELDS_OT_bake, export_operators.ARAPFIELDS_OT_export_animation
+    has_window, ask = bake_job.has_window, bake_job.ask
+    bake_job.has_window, bake_job.ask = lambda: True, lambda *given: asked.append(given[-1])
+    bake, export = operators.ARAPFIELDS_OT_bake, exporters.ARAPFIELDS_OT_export_animation
     try:
         for path, cls, given in ((cache, bake, {}), (file, export, {"format": "GLTF"})):
             assert pressed(cls, filepath=str(path), **given) == {"FINISHED"}
@@ -310,7 +310,7 @@ def test_a_press_overwrites_only_what_is_the_objects_own_or_confirmed():
         bpy.ops.arapfields.bake(filepath=str(cache))
         assert pressed(bake, filepath=str(cache)) == {"FINISHED"} and not asked
     finally:
-        bake_operator.has_window, bake_operator.ask = has_window, ask
+        bake_job.has_window, bake_job.ask = has_window, ask
 
 
 def test_the_button_that_overwrites_has_the_same_arguments():
@@ -320,7 +320,7 @@ def test_the_button_that_overwrites_has_the_same_arguments():
     layout = types.SimpleNamespace(operator=lambda name, **_: shown.update(name=name) or button)
     manager = types.SimpleNamespace(popup_menu=lambda draw, title, icon: shown.update(draw=draw, title=title))
     operator = types.SimpleNamespace(properties=given, bl_idname="arapfields.bake")
-    bake_operator.ask(types.SimpleNamespace(window_manager=manager), operator, [Path("a.mdd")])
+    bake_job.ask(types.SimpleNamespace(window_manager=manager), operator, [Path("a.mdd")])
     shown["draw"](types.SimpleNamespace(layout=layout), None)
     assert (shown["name"], shown["title"]) == ("arapfields.bake", "a.mdd exists already")
     assert (button.filepath, button.format, tuple(button.part)) == ("//a.mdd", "MDD", (1, 2))
@@ -330,7 +330,7 @@ def test_the_button_that_overwrites_has_the_same_arguments():
 def pressed(cls, **given):
     """What a press on the operator's button returns, where all goes well."""
 
-    class Operator(bake_operator.BakeOperator):
+    class Operator(bake_job.BakeOperator):
         scope, overwrite, places, path = "ACTIVE", False, cls.places, getattr(cls, "path", None)
         properties = types.SimpleNamespace(is_property_set=lambda name: name in given)
 

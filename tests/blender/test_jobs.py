@@ -23,14 +23,14 @@ if IN_BLENDER:
     from support.blender.wraps import SMALL, bar_and_target
 
     import addon
-    from addon.animation import played
-    from addon.blender import timers
+    from addon.animation import caches
+    from addon.blender import host
     from addon.blender.object_references import source_of
     from addon.carried import operators as carried
     from addon.core.errors import UserError
     from addon.core.runtime import jobs, native
     from addon.core.runtime.coroutines import Pause
-    from addon.core.runtime.progress import JobCancelled
+    from addon.core.runtime.jobs import JobCancelled
     from addon.deform.operators import ARAPFIELDS_OT_deform
     from addon.field_modifier import inputs
     from addon.handles import empties, operators
@@ -58,7 +58,7 @@ class Window:
         self.window_manager = self.workspace = self
         self.windows, self.data, self.context = [], self, self
         self.workspaces = [self]
-        self.scene, self.view_layer = timers.bpy.context.scene, timers.bpy.context.view_layer
+        self.scene, self.view_layer = host.bpy.context.scene, host.bpy.context.view_layer
 
     def event_timer_add(self, seconds, window):
         self.timers.append(seconds)
@@ -79,13 +79,13 @@ class Window:
 @contextlib.contextmanager
 def window():
     """A Window that the add-on takes for Blender's own."""
-    kept = display.bpy, timers.bpy, modal.has_window
-    stand_in = Window(timers.bpy.app)
-    display.bpy, timers.bpy, modal.has_window = stand_in, stand_in, lambda: True
+    kept = display.bpy, host.bpy, modal.has_window
+    stand_in = Window(host.bpy.app)
+    display.bpy, host.bpy, modal.has_window = stand_in, stand_in, lambda: True
     try:
         yield stand_in
     finally:
-        display.bpy, timers.bpy, modal.has_window = kept
+        display.bpy, host.bpy, modal.has_window = kept
 
 
 def operator(work):
@@ -454,7 +454,7 @@ def test_a_cache_is_found_from_where_the_file_was_saved_meanwhile():
     (path.parents[1] / "later").mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(path.parents[1] / "later/scene.blend"))
     assert advanced(running) == {"FINISHED"}
-    assert bar.modifiers[0].filepath == f"//../cache/{path.name}" and played.problem(bar) is None
+    assert bar.modifiers[0].filepath == f"//../cache/{path.name}" and caches.problem(bar) is None
 
 
 def test_a_bake_says_that_it_lost_a_handle():

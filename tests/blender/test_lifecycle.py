@@ -15,7 +15,7 @@ if IN_BLENDER:
 
     import addon
     from addon import lifecycle
-    from addon.blender import host, icons, library_loading, timers
+    from addon.blender import host, icons
     from addon.core.runtime import jobs, native, threads
     from addon.handles import held_counts
     from addon.jobs.display import display
@@ -54,7 +54,7 @@ def remains():
         "operators": dir(bpy.ops.arapfields),
         "property": [o for o in (bpy.types.Object, bpy.types.Scene) if hasattr(o, "arapfields")],
         "tools": pin_tools(),
-        "timers": timers.running(),
+        "timers": host.running(),
         "threads": threads.own_threads(),
         "drawings": lifecycle._drawn,
         "pictures": icons._collections,
@@ -93,7 +93,7 @@ def is_busy(state):
         return state._timer is not None or bool(state._previews)
     if state is previews.shown:
         return state.mesh is not None
-    return bool(state._started) if state is timers else bool(state)
+    return bool(state._started) if state is host else bool(state)
 
 
 def enter(state):
@@ -142,7 +142,7 @@ def test_nothing_is_left_when_the_extension_is_disabled(state):
 def test_in_a_window_drawing_and_timers_end_too():
     """Blender's own calls are noted, as a Blender without a window draws nothing."""
     addon.unregister()
-    drawings, kept = [], (lifecycle.has_window, library_loading.has_window, bpy.types.SpaceView3D)
+    drawings, kept = [], (lifecycle.has_window, host.has_window, bpy.types.SpaceView3D)
 
     class SpaceView3D:
         @staticmethod
@@ -159,7 +159,7 @@ def test_in_a_window_drawing_and_timers_end_too():
             return SpaceView3D if name == "SpaceView3D" else getattr(types, name)
 
     types = bpy.types
-    lifecycle.has_window = library_loading.has_window = tool.has_window = lambda: True
+    lifecycle.has_window = host.has_window = tool.has_window = lambda: True
     try:
         lifecycle.bpy = type("Bpy", (), {"app": bpy.app, "types": Types()})
         for _ in range(ROUNDS):
@@ -172,7 +172,7 @@ def test_in_a_window_drawing_and_timers_end_too():
             assert not left["timers"] and not left["tools"] and not left["key maps"]
     finally:
         lifecycle.bpy = bpy
-        lifecycle.has_window, library_loading.has_window, _ = kept
+        lifecycle.has_window, host.has_window, _ = kept
         tool.has_window = host.has_window
         addon.register()
     assert host.has_window() is False

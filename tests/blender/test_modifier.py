@@ -19,11 +19,11 @@ if IN_BLENDER:
     from support.blender.scenes import FIT
     from support.blender.stacks import build, by_hand, local_points
 
-    from addon.blender import modifier_kinds, modifier_stack
+    from addon.blender import modifier_stack
     from addon.blender.object_references import source_of
     from addon.core.runtime import jobs
     from addon.field_modifier import inputs
-    from addon.surface import staleness
+    from addon.surface import surface_fit
 
 pytestmark = pytest.mark.in_blender
 
@@ -265,11 +265,11 @@ def test_moving_the_modifier_does_not_age_the_fit():
     moving.location.z += 0.4
     bpy.ops.arapfields.deform(**scenes.QUICK)
     bpy.context.view_layer.update()
-    assert not staleness.reason(bar)
+    assert not surface_fit.reason(bar)
     bar.data.vertices[0].co.z += 0.1
     bar.data.update()
     bpy.context.view_layer.update()
-    assert staleness.reason(bar)
+    assert surface_fit.reason(bar)
 
 
 @pytest.mark.parametrize("way", ["off", "factor", "keyed"])
@@ -303,9 +303,9 @@ def kinds():
 
 
 def test_every_kind_of_this_blender_is_in_the_table():
-    missing = set(kinds()) - set(modifier_kinds.KINDS)
+    missing = set(kinds()) - set(modifier_stack.KINDS)
     assert not missing
-    assert all(kind.why for kind in modifier_kinds.KINDS.values())
+    assert all(kind.why for kind in modifier_stack.KINDS.values())
 
 
 def added(bar, kind):
@@ -327,10 +327,10 @@ def test_the_field_stands_where_the_table_says():
             continue
         place = modifier_stack.place(bar)
         seen[kind] = place
-        follows = modifier_kinds.KINDS[kind].follows_field and kind not in modifier_stack.ORIGINAL
+        follows = modifier_stack.KINDS[kind].follows_field and kind not in modifier_stack.ORIGINAL
         assert place == int(not follows), kind
         before = len(bar.data.vertices)
-        if modifier_kinds.KINDS[kind].keeps:
+        if modifier_stack.KINDS[kind].keeps:
             assert len(local_points(bar)) == before, kind
     assert {
         seen[kind] for kind in ("PARTICLE_SYSTEM", "COLLISION", "SURFACE", "MASK", "BUILD", "SUBSURF")

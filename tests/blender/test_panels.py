@@ -19,9 +19,8 @@ if IN_BLENDER:
 
     import addon.registration as registration
     from addon import first_run, menus
-    from addon.blender import guide, language
-    from addon.blender.language import about, translated
-    from addon.blender.translations import read_po, translations
+    from addon.blender import language, source_operator
+    from addon.blender.language import about, read_po, translated, translations
     from addon.core.errors import UserError
     from addon.core.runtime import jobs
     from addon.handles import empties
@@ -422,7 +421,7 @@ def test_an_empty_added_as_a_handle_is_one():
 
 
 def test_every_operator_names_its_page_and_every_page_exists():
-    address, patterns = guide.manual_map()
+    address, patterns = source_operator.manual_map()
     folder = Path(url2pathname(urlparse(address).path))
     assert all((folder / page).is_file() for _, page in patterns)
 
@@ -434,15 +433,17 @@ def test_every_operator_names_its_page_and_every_page_exists():
     assert len(own) > 15
     for cls in own:
         tooltip = cls.description(bpy.context, None)
-        assert tooltip.startswith(cls.__doc__) and f"Guide: {guide.LABELS[cls.guide]}" in tooltip, cls
+        assert tooltip.startswith(cls.__doc__) and f"Guide: {source_operator.LABELS[cls.guide]}" in tooltip, (
+            cls
+        )
         assert page(f"bpy.ops.{cls.bl_idname}").startswith(cls.guide)
     assert page("bpy.types.ARAPFIELDS_PG_deform.bending").startswith("deform")
     assert page("bpy.types.ARAPFIELDS_PG_object.target").startswith("results")
     assert page("bpy.ops.object.delete") is None
-    assert bpy.utils.manual_map is not None and guide.manual_map in bpy.utils._manual_map
-    guide.end()
-    assert guide.manual_map not in bpy.utils._manual_map
-    guide.begin(registration.CLASSES)
+    assert bpy.utils.manual_map is not None and source_operator.manual_map in bpy.utils._manual_map
+    source_operator.end()
+    assert source_operator.manual_map not in bpy.utils._manual_map
+    source_operator.begin(registration.CLASSES)
 
 
 def test_the_first_start_says_where_the_extension_is_and_only_the_first():

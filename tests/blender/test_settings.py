@@ -20,8 +20,8 @@ if IN_BLENDER:
     import addon.registration as registration
     from addon.blender import former_defaults
     from addon.blender.property_definitions import effective_values
+    from addon.core.settings.choices import STYLES, STYLIZE
     from addon.core.settings.parameters import DEFORM, FIT, TABLE
-    from addon.core.settings.styles import STYLES, STYLIZE
     from addon.solver import setup
 
 pytestmark = pytest.mark.in_blender

@@ -20,7 +20,7 @@ if IN_BLENDER:
     from support.blender.styles import SETTINGS, ball
 
     from addon.core.runtime import jobs
-    from addon.core.settings.styles import STYLES, style_identifier, style_name
+    from addon.core.settings.choices import STYLES, style_identifier, style_name
     from addon.live import sessions
     from addon.solver import setup, style_object
     from addon.stylize import ball as picture

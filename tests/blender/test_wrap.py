@@ -33,7 +33,7 @@ if IN_BLENDER:
     from addon.handles.empties import matrix_of
     from addon.results import visibility
     from addon.wrap import landmarks
-    from addon.wrap.clicking import ARAPFIELDS_OT_click_landmarks as Operator
+    from addon.wrap.landmark_tools import ARAPFIELDS_OT_click_landmarks as Operator
     from arapfields.cli import contact_sheet
 
 pytestmark = pytest.mark.in_blender

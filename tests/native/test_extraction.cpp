@@ -10,10 +10,10 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "distance/signed_distance.h"
+#include "extraction/adaptive_mesh.h"
 #include "extraction/batch_function.h"
 #include "extraction/extract_deformed.h"
 #include "extraction/extract_surface.h"
-#include "extraction/thin_parts.h"
 #include "implicit_shapes.h"
 
 using namespace arapfields;

@@ -10,9 +10,8 @@
 #include "distance/welded_vertices.h"
 #include "shapes.h"
 #include "wrap/correspondence.h"
-#include "wrap/curvature.h"
-#include "wrap/scan_noise.h"
 #include "wrap/smooth_map.h"
+#include "wrap/target.h"
 
 using namespace arapfields;
 

@@ -222,6 +222,6 @@ def test_every_guide_page_ships_and_its_links_resolve(files):
 
 
 def test_pages_named_by_tooltips_exist(files):
-    source = (ROOT / "addon/blender/guide.py").read_text()
+    source = (ROOT / "addon/blender/source_operator.py").read_text()
     named = set(re.findall(r'"(?:ARAPFIELDS_PG_\w+)": "(\w+)"', source))
     assert len(named) > 3 and {f"guide/{page}.html" for page in named} <= {*files}

@@ -10,7 +10,7 @@ import bpy
 from support.blender import scenes
 from support.blender.stacks import local_points
 
-import addon.animation.operators as bake
+from addon.animation import operators
 from addon.core.runtime import jobs
 from addon.core.runtime.coroutines import Pause, run_to_completion
 from addon.solver.frame_solver import FrameSolver
@@ -31,10 +31,10 @@ def animated(name="Bar"):
     return bar
 
 
-def stepped(kind=bake.ARAPFIELDS_OT_bake, **given):
+def stepped(kind=operators.ARAPFIELDS_OT_bake, **given):
     """A stand-in for a bake operator in a window, as a plain object; tests step its coroutine."""
 
-    class Operator(bake.CacheOperator):
+    class Operator(operators.CacheOperator):
         title, in_window, scope, filepath = kind.title, False, "ACTIVE", given.pop("filepath", "")
         kind_of, bake_of, choose, used = kind.kind_of, kind.bake_of, kind.choose, kind.used
         part = (0, 0)

@@ -10,10 +10,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from addon.commands.batch import run_batch
+from addon.commands.batch import FOLDER, Record, run_batch
 from addon.commands.main import interruptible
 from addon.commands.parser import parse
-from addon.commands.record import FOLDER, Record
 
 
 def make_folders(place):

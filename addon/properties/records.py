@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One carried object of a source."""
+"""Records of carried objects and of poses, stored in the file."""
 
 import bpy
 
@@ -21,4 +21,8 @@ class ARAPFIELDS_PG_carried(bpy.types.PropertyGroup):
     base_kind: choice(BASE_KINDS, "Kind of Own Pose", "What the object's own pose consists of")
 
 
-CLASSES = [ARAPFIELDS_PG_carried]
+class ARAPFIELDS_PG_pose(bpy.types.PropertyGroup):
+    data: text("Field", "The field, with samples of the shape that it was solved on")
+
+
+CLASSES = [ARAPFIELDS_PG_carried, ARAPFIELDS_PG_pose]

@@ -1,16 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pairs of landmarks by click: a place on the object, then the same place on the target."""
+"""Landmarks in the viewport: placed by click, drawn with their numbers, proposed by shape."""
 
+import blf
 import bpy
+import gpu
 import numpy as np
 from bpy_extras import view3d_utils
+from gpu_extras.batch import batch_for_shader
 
 from ..blender.language import translated
-from ..blender.object_references import ObjectReference, settings_of, source_of
+from ..blender.object_references import ObjectReference, refusal_of_linked, settings_of, source_of
+from ..blender.property_definitions import effective_values, integer, options_of
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
+from ..core.geometry.spaces import transform
+from ..core.runtime import native
+from ..core.runtime.jobs import Item
+from ..core.settings.parameters import WRAP
+from ..jobs.job_operator import JobOperator
+from ..pin_tool import screen
+from ..pin_tool.drawing import CIRCLE, DARK
 from ..results import visibility
+from ..surface.source_surface import read_surface
 from . import landmarks
+
+# Pairs of landmarks by click: a place on the object, then the same place on the target.
 
 AROUND = np.arange(0, 2 * np.pi, np.pi / 4)
 # Offsets in pixels around a click that are searched for a surface: scans have holes, and limbs are thin.
@@ -140,4 +154,89 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = [ARAPFIELDS_OT_click_landmarks]
+# Draws each pair of landmarks in the viewport: its number on a disc of its colour, at both ends.
+
+RADIUS, SIZE = 9, 11  # of a disc, and of its number, in pixels
+
+
+def draw():
+    context = bpy.context
+    source = source_of(context) if context.region_data is not None else None
+    if source is None or not context.space_data.overlay.show_overlays:
+        return
+    used, size = landmarks.used(source), (context.region.width, context.region.height)
+    perspective = np.array(context.region_data.perspective_matrix)
+    gpu.state.blend_set("ALPHA")
+    for number, entry in enumerate(settings_of(source).wrap.landmarks, 1):
+        for item in (entry.rest, entry.on_target) if entry in used else ():
+            place = item.matrix_world.translation
+            if item == entry.rest:
+                place = landmarks.shown_place(source, place)
+            spot = screen.project(perspective, size, place)[0]
+            if item.visible_get() and np.isfinite(spot).all():
+                disc(context, spot, tuple(entry.colour), str(number))
+    gpu.state.blend_set("NONE")
+
+
+def disc(context, spot, colour, text):
+    """Draws a number on a disc around a pixel, dark or bright by the colour's luminance."""
+    scale, shader = context.preferences.system.ui_scale, gpu.shader.from_builtin("UNIFORM_COLOR")
+    for shade, radius in ((DARK, RADIUS + 1.5), ((*colour, 1.0), RADIUS)):
+        rim = spot + radius * scale * CIRCLE
+        shader.uniform_float("color", shade)
+        fan = [(*rim[i], 0.0) for k in range(1, len(rim) - 1) for i in (0, k, k + 1)]
+        batch_for_shader(shader, "TRIS", {"pos": fan}).draw(shader)
+    dark = np.dot(colour, (0.3, 0.59, 0.11)) > 0.45
+    blf.size(0, SIZE * scale)
+    width, height = blf.dimensions(0, text)
+    blf.position(0, spot[0] - width / 2, spot[1] - height / 2, 0)
+    blf.color(0, *((0, 0, 0, 1) if dark else (1, 1, 1, 1)))
+    blf.draw(0, text)
+
+
+# Proposes pairs of landmarks by shape, for the user to check and move.
+
+
+class ARAPFIELDS_OT_suggest_landmarks(JobOperator, bpy.types.Operator):
+    """Propose pairs of landmarks: ends of the object, and where they belong on the target by shape"""
+
+    bl_label = "Suggest Landmarks"
+    bl_options = {"UNDO"}
+    title = "Suggest Landmarks"
+    guide = "wrap"
+
+    count: integer("Count", "How many pairs at most", default=8, min=1, soft_max=20, options={"SKIP_SAVE"})
+
+    @classmethod
+    def refuses(cls, source):
+        return refusal_of_linked(source) or landmarks.refusal(source)
+
+    def plan(self, context, source, weights):
+        values, af = effective_values(WRAP, settings_of(source).wrap, None), native.library()
+        options, count = options_of("wrap", values), self.count
+        surface = read_surface(context, source, exact=True)
+        target = landmarks.target_of(source)
+        vertices, triangles = landmarks.read_target(context, target, surface.space)
+        ends = ObjectReference(source), ObjectReference(target)
+
+        def work(tracker):
+            samples = surface.samples(tracker, values["samples"], values["seed"], own_triangles=True)
+            task = tracker.start("Comparing", 1.0)
+            return af.suggest_landmarks(samples, af.MeshSdf(vertices, triangles), count, options, task=task)
+
+        def apply(pairs):
+            item, onto = (end.get() for end in ends)
+            size = landmarks.SIZE * np.linalg.norm(np.ptp(surface.vertices, axis=0))
+            known = [pair[0] for pair in landmarks.read(item, surface.space)]
+            made = [pair for pair in pairs if all(np.linalg.norm(pair[0] - one) > size for one in known)]
+            for pair in made:
+                landmarks.add(bpy.context, item, onto, transform(surface.space.solve_to_world, pair))
+            return translated("Pairs of landmarks added: {count}", count=len(made))
+
+        return Item(source.name, work, apply)
+
+
+CLASSES = [
+    ARAPFIELDS_OT_click_landmarks,
+    ARAPFIELDS_OT_suggest_landmarks,
+]

@@ -1,7 +1,106 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fits carried objects of a wrapped body to the target body, at the same distance from its surface."""
+"""Transfers to another mesh: marked edges, UV coordinates, and objects at their distance from the surface."""
+
+import heapq
+from collections import defaultdict
 
 import numpy as np
+
+# Transfers marked edges of one mesh to paths of nearby edges on another.
+
+ASIDE = 2.0  # cost of distance from the marked edge, relative to path length
+LONGEST = 3.0  # longest path, relative to its edge; longer ones are dropped
+
+
+def carried_marks(ends, values, nearest, vertices, edges):
+    """(m,) values for a mesh's edges (m, 2), along the shortest paths between the ends of each marked edge.
+
+    `ends` (k, 2, 3): ends of the marked edges; `nearest` (k, 2): the mesh's vertices nearest to them;
+    `values` (k,): of the marked edges; the largest counts where paths overlap.
+    """
+    about = defaultdict(list)
+    for number, (a, b) in enumerate(edges.tolist()):
+        about[a].append((b, number))
+        about[b].append((a, number))
+    result = np.zeros(len(edges))
+    for pair, value, (start, goal) in zip(ends, values, nearest.tolist(), strict=True):
+        for number in path(pair, start, goal, vertices, about):
+            result[number] = max(result[number], value)
+    return result
+
+
+def path(pair, start, goal, vertices, about):
+    """Edge indices of the path between two vertices nearest to a straight line; [] if it is too long."""
+    if start == goal:
+        return []
+    along = pair[1] - pair[0]
+    size = np.linalg.norm(along) or 1.0
+    furthest = LONGEST * max(size, np.linalg.norm(vertices[goal] - vertices[start]))
+
+    def cost(a, b):
+        middle = (vertices[a] + vertices[b]) / 2 - pair[0]
+        beside = middle - np.clip(middle @ along / size**2, 0, 1) * along
+        return np.linalg.norm(vertices[b] - vertices[a]) * (1 + ASIDE * np.linalg.norm(beside) / size)
+
+    reached, queue = {}, [(0.0, start, None, None)]
+    while queue:
+        length, here, before, number = heapq.heappop(queue)
+        if here in reached or length > furthest:
+            continue
+        reached[here] = before, number
+        if here == goal:
+            break
+        for there, edge in about[here]:
+            if there not in reached:
+                heapq.heappush(queue, (length + cost(here, there), there, here, edge))
+    found = []
+    while goal in reached and goal != start:
+        goal, number = reached[goal]
+        found.append(number)
+    return found
+
+
+# Transfers UV coordinates to the face corners of another mesh, whose faces may cross seams.
+
+# A seam lies between a corner and its face's center if the corner's UV is off the extrapolated one by more
+# than this many times the extrapolated change.
+CUT = 3.0
+
+
+def fan(vertices, starts, corners):
+    """((n + m, 3) vertices and face centers, (c, 3) triangles, (c,) face of each corner)."""
+    counts = np.diff(np.append(starts, len(corners)))
+    face = np.repeat(np.arange(len(starts)), counts)
+    centres = np.add.reduceat(vertices[corners], starts) / counts[:, None]
+    following = np.arange(1, len(corners) + 1)
+    following[starts + counts - 1] = starts
+    triangles = np.stack([len(vertices) + face, corners, corners[following]], axis=1).astype(np.int32)
+    return np.concatenate([vertices, centres]), triangles, face
+
+
+def corner_coordinates(points, places, shares, corners, face, moved, uv):
+    """((c, 2) UVs of face corners, (c,) whether a seam separates the corner from its face's center).
+
+    `points` (n + m, 3) of `fan` lie on triangle `places` (n + m,) at barycentric coordinates `shares`
+    (n + m, 3); `moved` (t, 3, 3) are the triangles' corners, `uv` (t, 3, 2) their UVs. Beyond a seam, the UV
+    map at the face's center is extrapolated.
+    """
+    at = (shares[:, :, None] * uv[places]).sum(axis=1)
+    centre = len(points) - (face.max() + 1) + face
+    own = places[centre]
+    sides = moved[own][:, 1:] - moved[own][:, :1]
+    slopes = uv[own][:, 1:] - uv[own][:, :1]
+    metric = sides @ sides.transpose(0, 2, 1)
+    metric += 1e-9 * np.trace(metric, axis1=1, axis2=2)[:, None, None] * np.eye(2) + 1e-30 * np.eye(2)
+    offset = points[corners] - points[centre]
+    parts = np.linalg.solve(metric, (sides @ offset[:, :, None]))[:, :, 0]
+    step = (parts[:, :, None] * slopes).sum(axis=1)
+    straight, direct = at[centre] + step, at[corners]
+    beyond = np.linalg.norm(direct - straight, axis=1) > CUT * np.linalg.norm(step, axis=1) + 1e-6
+    return np.where(beyond[:, None], straight, direct), beyond
+
+
+# Fits carried objects of a wrapped body to the target body, at the same distance from its surface.
 
 REACH = 0.05  # of the diagonal: distance from the surface over which the fit fades to the wrap alone
 MISSING = 0.02  # of the diagonal: a target farther from the wrapped body has a gap there
