@@ -23,11 +23,11 @@ ContactLimits::ContactLimits(const Contact& contact, const Points& start, const 
   frame_ = Frame::around(start);
   std::vector<bool> known;  // whether the distance is one
   for (const Obstacle& obstacle : contact.obstacles) {
-    sides_.push_back({BarrierSurface(obstacle, frame_), {}, {}});
+    sides_.push_back({ContactSurface(obstacle, frame_), {}, {}});
     known.push_back(obstacle.function->gradient_bound() == 1.0);
   }
   if (contact.ground) {
-    sides_.push_back({BarrierSurface::ground({*contact.ground, contact.up}, frame_), {}, {}});
+    sides_.push_back({ContactSurface::ground({*contact.ground, contact.up}, frame_), {}, {}});
     known.push_back(true);
   }
   const Points places = frame_.to_cube(start);
@@ -70,7 +70,7 @@ bool ContactLimits::keep(const Side& side, int round, Points& positions, std::ve
       if (hits[k].parameter <= 1.0)
         places.row(k) = (hits[k].place + side.least[near[k]] * hits[k].normal).transpose();
   }
-  const BarrierSurface::Nearest nearest = side.surface.nearest(places);
+  const ContactSurface::Nearest nearest = side.surface.nearest(places);
   bool beyond = false;
   for (std::size_t k = 0; k < near.size(); ++k) {
     const Index i = near[k], row = static_cast<Index>(k);

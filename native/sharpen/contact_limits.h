@@ -22,7 +22,7 @@ class ContactLimits {
 
  private:
   struct Side {
-    BarrierSurface surface;
+    ContactSurface surface;
     Vector least;  // (k) distances, in the frame
     Vector room;   // (k) how far a node may go in any direction
   };
