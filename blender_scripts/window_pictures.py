@@ -24,7 +24,9 @@ ADVANCED, STATUS = 5, 72  # row of Advanced, before that of the status; height o
 SHOWN = (1280, 800)
 TOP = (("handles", "panel", 0), ("deform", "panel", 1), ("stylize", "panel-style", 0))  # picture, row
 WITHIN = (("surface", 0), ("result", 3))
-WINDOW = ("handles", "running", "cancelled", "live")  # blender-NAME.webp
+WINDOW = {name: name for name in ("handles", "running", "cancelled")} | {
+    "live": "dragged"
+}  # blender-NAME.webp
 MENU = (940, 185, 1284, 429)  # the menu of styles with its section's header
 
 
@@ -83,11 +85,11 @@ def main():
     parser.add_argument("--to", type=Path, default=ROOT / "docs/images")
     options = parser.parse_args()
     of_panel(options.panel, options.to)
-    for name in WINDOW:
+    for name, taken in WINDOW.items():
         folder = options.panel if name == "handles" else options.jobs
         if folder is None:
             continue
-        shown = Image.open(folder / f"{name}.png").convert("RGB")
+        shown = Image.open(folder / f"{taken}.png").convert("RGB")
         save(shown.resize(SHOWN, Image.Resampling.LANCZOS), options.to / f"blender-{name}.webp")
 
 

@@ -12,6 +12,7 @@ from support.blender import scenes
 from addon.core.runtime import jobs
 from addon.viewport import previews
 
+SIDEBAR = (1150, 700)  # a spot over it
 LONG = {**scenes.NEW, "iterations": 200000}
 
 
@@ -69,10 +70,20 @@ def in_place(figures, folder, before):
 
 
 def escape(figures, before):
-    """Cancels by the key instead of the button."""
+    """Cancels by the key over the view, which does no such thing over the sidebar or in a popup."""
     invoke(LONG)
-    stage.tool("mousemove", 600, 500)
+    stage.tool("mousemove", *SIDEBAR)
     yield 1.5
+    stage.tool("key", "Escape")
+    yield 1.5
+    figures["escape_over_the_sidebar_cancels"] = jobs.running() is None or jobs.running().cancelled
+    stage.tool("mousemove", 600, 500)
+    yield 0.5
+    stage.tool("key", "shift+a")
+    yield 1.5
+    stage.tool("key", "Escape")
+    yield 1.5
+    figures["escape_of_a_popup_cancels"] = jobs.running() is None or jobs.running().cancelled
     begin = time.perf_counter()
     stage.tool("key", "Escape")
     yield from until_idle(30)

@@ -77,6 +77,7 @@ EXPECTED = {  # {part: {result: rule}}, complete
         "exact_after_cancel": TRUE,
         "shown_on_the_mesh": above(0.3),
         "exact_after_cancel_in_place": TRUE,
+        **all_of(is_(False), "escape_over_the_sidebar_cancels", "escape_of_a_popup_cancels"),
         "escape_s": below(10.0),
         **all_of(TRUE, "exact_after_escape", "preview_gone", "one_undo_step"),
         "modal_against_blocking": is_(0.0),
