@@ -95,8 +95,8 @@ class SolveReport(EnergyReport):
     far_target: float | None = None
     """Distance of the farthest target divided by the shape's size, if that is large."""
     turned_triangles: int = 0
-    """Triangles of the mesh that turn over where the field does not fold: they are too long for the motion. 0 where
-    they are less than 0.2 % of it."""
+    """Triangles of the mesh that turn over where the field does not fold: they are too long for the motion.
+    0 where they are less than 0.2 % of it."""
 
     @property
     def out_of_time(self) -> bool:
