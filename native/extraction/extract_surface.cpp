@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "core/errors.h"
+#include "extraction/adaptive_mesh.h"
 #include "extraction/marching_cubes.h"
-#include "extraction/thin_parts.h"
 
 namespace arapfields {
 namespace {

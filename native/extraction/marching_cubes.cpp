@@ -10,7 +10,6 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "extraction/cell.h"
-#include "extraction/cell_table.h"
 
 namespace arapfields {
 namespace {

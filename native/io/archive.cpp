@@ -9,7 +9,7 @@
 
 #include "core/errors.h"
 #include "core/memory.h"
-#include "io/json.h"
+#include "io/document.h"
 #include "io/output_file.h"
 
 namespace arapfields {

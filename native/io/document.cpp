@@ -1,7 +1,85 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "io/document.h"
 
+#include <algorithm>
+#include <set>
+#include <vector>
+
+#include "core/errors.h"
+
 namespace arapfields {
+namespace {
+
+constexpr int most_nesting = 32;
+
+std::string quoted(const std::string& name) { return std::string(1, '\'').append(name).append(1, '\''); }
+
+/// Finite: JSON has no other numbers, and those beyond a double's range are no JSON to the parser.
+double number_of(const Json& value, const std::string& name) {
+  require(value.is_number(), name, std::string("a ") + value.type_name(), "a number is needed");
+  return value.get<double>();
+}
+
+}  // namespace
+
+Json parse_json(const std::string& text, const std::string& what) {
+  std::vector<std::set<std::string>> members;
+  const auto watch = [&](int depth, Json::parse_event_t event, Json& value) {
+    require(depth <= most_nesting, what, "nested deeper than " + std::to_string(most_nesting),
+            "files that save writes are not");
+    if (event == Json::parse_event_t::object_start) members.emplace_back();
+    if (event == Json::parse_event_t::object_end) members.pop_back();
+    if (event == Json::parse_event_t::key)
+      require(members.back().insert(value.get<std::string>()).second, what,
+              quoted(value.get<std::string>()).append(" stands there twice"), "once is allowed");
+    return true;
+  };
+  try {
+    return Json::parse(text, watch);
+  } catch (const Json::exception& error) {
+    throw InvalidInput(what, "not JSON", error.what());
+  }
+}
+
+JsonObject::JsonObject(const Json& value, std::string name, std::initializer_list<const char*> known)
+    : value_(value), name_(std::move(name)) {
+  require(value.is_object(), name_, std::string("a ") + value.type_name(), "an object is needed");
+  for (const auto& member : value.items())
+    require(std::any_of(known.begin(), known.end(), [&](const char* k) { return member.key() == k; }), name_,
+            "unknown member " + quoted(member.key()), "this release does not know it");
+}
+
+const Json& JsonObject::at(const char* member) const {
+  require(has(member), name_, quoted(member).append(" is missing"), "it is needed");
+  return value_[member];
+}
+
+std::string JsonObject::text(const char* member) const {
+  const Json& value = at(member);
+  require(value.is_string(), name(member), std::string("a ") + value.type_name(), "a text is needed");
+  return value.get<std::string>();
+}
+
+double JsonObject::number(const char* member) const { return number_of(at(member), name(member)); }
+
+Index JsonObject::integer(const char* member, Index low, Index high) const {
+  const double value = number(member);
+  require(at(member).is_number_integer() && value >= static_cast<double>(low) &&
+              value <= static_cast<double>(high),
+          name(member), at(member).dump(),
+          "an integer from " + std::to_string(low) + " to " + std::to_string(high) + " is needed");
+  return at(member).get<Index>();
+}
+
+Vec3 JsonObject::triple(const char* member) const {
+  const Json& value = at(member);
+  require(value.is_array() && value.size() == 3, name(member), "not a list of three",
+          "three numbers are needed");
+  Vec3 result;
+  for (int k = 0; k < 3; ++k) result[k] = number_of(value[k], name(member));
+  return result;
+}
+
 namespace {
 
 constexpr const char* format_name = "arapfields";

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "io/archive.h"
-#include "io/json.h"
+#include "io/document.h"
 #include "neural/mlp.h"
 
 namespace arapfields {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/errors.h"
-#include "io/json.h"
+#include "io/document.h"
 #include "io/output_file.h"
 
 namespace arapfields {

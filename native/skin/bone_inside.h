@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "skin/bone_sight.h"
+#include "skin/bone_regions.h"
 #include "skin/skeleton.h"
 
 namespace arapfields {

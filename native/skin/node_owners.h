@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "skin/bone_sight.h"
+#include "skin/bone_regions.h"
 
 namespace arapfields {
 

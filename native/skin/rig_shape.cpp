@@ -12,7 +12,7 @@
 #include "sampling/canonical_order.h"
 #include "sampling/nearest_sample.h"
 #include "sampling/sample_choice.h"
-#include "skin/bone_sight.h"
+#include "skin/bone_regions.h"
 #include "solve/setup.h"
 
 namespace arapfields {

@@ -8,7 +8,6 @@
 #include "options/skin.h"
 #include "sampling/oriented_points.h"
 #include "skin/bone_regions.h"
-#include "skin/piece_points.h"
 
 namespace arapfields {
 

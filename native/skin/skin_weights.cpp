@@ -8,9 +8,8 @@
 #include "core/parallel.h"
 #include "distance/welded_vertices.h"
 #include "mesh/outward_triangles.h"
+#include "skin/bone_choice.h"
 #include "skin/example_poses.h"
-#include "skin/limb_sides.h"
-#include "skin/vertex_blend.h"
 #include "skin/weight_fit.h"
 
 namespace arapfields {

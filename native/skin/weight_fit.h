@@ -6,9 +6,27 @@
 #include "core/task.h"
 #include "skin/bone_choice.h"
 #include "skin/example_poses.h"
-#include "skin/rig_twins.h"
+#include "skin/rig_shape.h"
 
 namespace arapfields {
+
+/// Interpolates values at a rig's nodes to other points by moving least squares of first order, from nodes of
+/// the same surface and side.
+class VertexBlend {
+ public:
+  /// For these points and their nearest nodes.
+  VertexBlend(const RigShape& rig, const PiecePoints& given, const std::vector<Index>& nearest);
+
+  /// Values (nodes, k) at the points (n, k).
+  RowMatrix<float> operator()(const RowMatrix<float>& values) const;
+
+ private:
+  struct Entry {
+    Index node;
+    float weight;
+  };
+  std::vector<std::vector<Entry>> entries_;
+};
 
 /// Weight of the smoothness at option 1, for squared distances in sizes of the shape.
 constexpr double smoothness_weight = 3e-4;

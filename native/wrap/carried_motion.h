@@ -1,15 +1,36 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Transfer of displacements from one mesh to another by their differences along edges.
 #pragma once
 
 #include <Eigen/SparseCholesky>
+#include <cstdint>
 #include <vector>
 
 #include "core/task.h"
+#include "mesh/triangle_mesh.h"
 #include "wrap/smooth_map.h"
-#include "wrap/surface_places.h"
+
+// Transfer of displacements from one mesh to another by their differences along edges.
 
 namespace arapfields {
+
+/// Points (n) on a mesh, by triangles and barycentric coordinates.
+struct SurfacePlaces {
+  std::vector<std::int32_t> triangles;  ///< (n)
+  Points shares;                        ///< (n,3) barycentric coordinates, ≥ 0
+  Vector distances;                     ///< (n) from the query points, in mesh units
+
+  /// Values of the mesh's vertices at point i, interpolated linearly: at(v) is that of vertex v.
+  template <class At>
+  auto interpolated(const Triangles& mesh, Index i, At&& at) const {
+    const auto corner = [&](int k) { return shares(i, k) * at(mesh(triangles[i], k)); };
+    return (corner(0) + corner(1) + corner(2)).eval();
+  }
+};
+
+/// The point of a mesh closest to each point (n,3), preferably on a side whose normal agrees with the point's
+/// normal (n,3), since thin parts have two sides. A normal of length 0 takes either side.
+SurfacePlaces places_on(const TriangleMesh& mesh, PointsIn points, PointsIn normals,
+                        const Progress& progress = {});
 
 /// Displacements u on a mesh whose differences along edges follow those that a map M carries over from a
 /// giving mesh: argmin Σ w ‖u_i − u_j − d_ij‖² + Σ a ‖u − M(δ)‖² / L², with cotangent weights w and areas a.

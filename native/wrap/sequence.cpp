@@ -12,9 +12,9 @@
 #include "sampling/sample_choice.h"
 #include "solve/setup.h"
 #include "solve/warnings.h"
+#include "wrap/flow.h"
 #include "wrap/measure.h"
 #include "wrap/parameters.h"
-#include "wrap/velocity.h"
 
 namespace arapfields {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "fields/field.h"
-#include "wrap/surface_places.h"
+#include "wrap/carried_motion.h"
 
 namespace arapfields {
 

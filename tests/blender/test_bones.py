@@ -10,8 +10,8 @@ import arapfields as af
 if IN_BLENDER:
     import bpy
     from support.blender import character, scenes
-    from support.blender.bones import handles_of, rigged_bar
     from support.blender.live import step
+    from support.blender.skins import handles_of, rigged_bar
 
     from addon.blender import modifier_stack
     from addon.core.runtime import jobs

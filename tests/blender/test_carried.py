@@ -11,10 +11,10 @@ if IN_BLENDER:
     import bpy
     from mathutils import Vector
     from support.blender import scenes, wraps
-    from support.blender.bones import rigged_bar
     from support.blender.live import step
     from support.blender.riders import body, link, rider, shown, taken
     from support.blender.scenes import camera, delete
+    from support.blender.skins import rigged_bar
 
     import arapfields as af
     from addon.blender import mesh_arrays, modifier_stack

@@ -9,8 +9,7 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.baking import at, cache_file, solved
-    from support.blender.contact import lowest, pressed
-    from support.blender.live import step
+    from support.blender.live import lowest, pressed, step
     from support.blender.panels import Layout
     from support.blender.stacks import local_points
 

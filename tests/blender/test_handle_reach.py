@@ -12,9 +12,8 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.baking import RUN, cache_file
-    from support.blender.live import step
+    from support.blender.live import pin, step
     from support.blender.panels import drawn
-    from support.blender.pins import pin
     from support.blender.stacks import local_points
     from support.blender.wraps import SMALL
 

@@ -12,10 +12,9 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes
     from support.blender.baking import animated
-    from support.blender.bones import rigged_bar
-    from support.blender.live import step
+    from support.blender.live import pin, step
     from support.blender.panels import drawn
-    from support.blender.pins import pin
+    from support.blender.skins import rigged_bar
 
     from addon.blender.object_references import owner_of, source_of
     from addon.core.geometry.spaces import rigid_motion, space_of
@@ -357,9 +356,8 @@ if inside.IN_BLENDER:
     from mathutils import Matrix
     from support.blender import scenes
     from support.blender.baking import at, cache_file
-    from support.blender.live import step
+    from support.blender.live import pin, step
     from support.blender.panels import drawn
-    from support.blender.pins import pin
 
     from addon.core.geometry.spaces import space_of
     from addon.handles import empties

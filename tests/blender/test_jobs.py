@@ -16,9 +16,9 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes, stages
     from support.blender.baking import animated, saved_animation, stepped
-    from support.blender.bones import rigged_bar
     from support.blender.panels import Layout
     from support.blender.scenes import delete
+    from support.blender.skins import rigged_bar
     from support.blender.stages import Operator
     from support.blender.wraps import SMALL, bar_and_target
 

@@ -10,9 +10,8 @@ import arapfields
 if IN_BLENDER:
     import bpy
     from support.blender import scenes, wraps
-    from support.blender.layers import QUICK, SAME, STYLE, structure, styled, with_handles
-    from support.blender.live import WAIT, step
-    from support.blender.pins import pin, state
+    from support.blender.live import WAIT, pin, state, step
+    from support.blender.stacks import QUICK, SAME, STYLE, structure, styled, with_handles
 
     from addon.blender import modifier_stack
     from addon.core.runtime import jobs

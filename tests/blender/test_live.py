@@ -15,10 +15,9 @@ if IN_BLENDER:
     import bpy
     from support.blender import scenes, stages
     from support.blender.baking import animated
-    from support.blender.bones import rigged_bar
-    from support.blender.live import step
-    from support.blender.pins import pin
+    from support.blender.live import pin, step
     from support.blender.scenes import camera, delete
+    from support.blender.skins import rigged_bar
     from support.blender.stacks import add_modifier, build, local_points
     from support.blender.stages import watched
 

@@ -11,8 +11,7 @@ if IN_BLENDER:
     import bpy
     from mathutils import Matrix
     from support.blender import scenes
-    from support.blender.live import WAIT, step
-    from support.blender.pins import from_above, pin, state
+    from support.blender.live import WAIT, from_above, pin, state, step
 
     from addon.core.geometry.rotations import best_rotation
     from addon.core.geometry.spaces import transform

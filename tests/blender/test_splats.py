@@ -13,8 +13,7 @@ if IN_BLENDER:
     import bpy
     from mathutils import Matrix
     from support.blender import scans, scenes
-    from support.blender.live import step
-    from support.blender.pins import pin
+    from support.blender.live import pin, step
     from support.blender.scans import file_values, given, places, scan, shown, vector_values
     from support.files import written_splats
     from support.files.full_disk import files_of_at_most

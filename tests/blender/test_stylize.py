@@ -14,10 +14,8 @@ if IN_BLENDER:
     import bpy
     from mathutils import Matrix
     from support.blender import scenes
-    from support.blender.live import step
-    from support.blender.pins import pin
+    from support.blender.live import SETTINGS, ball, pin, step
     from support.blender.scenes import FIT
-    from support.blender.styles import SETTINGS, ball
 
     from addon.core.runtime import jobs
     from addon.core.settings.choices import STYLES, style_identifier, style_name

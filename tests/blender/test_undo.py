@@ -10,8 +10,7 @@ from support.blender.inside import IN_BLENDER
 if IN_BLENDER:
     import bpy
     from support.blender import scenes
-    from support.blender.live import step
-    from support.blender.pins import pin
+    from support.blender.live import pin, step
 
     from addon.live import live_solver, sessions
     from addon.pin_tool import drag

@@ -15,7 +15,7 @@ from support.geometry.meshes import sphere
 from support.programs.batches import starts, statuses
 
 import arapfields as af
-from arapfields.cli.tracks import read_tracks
+from arapfields.cli.handles import read_tracks
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "docs" / "examples" / "farm"

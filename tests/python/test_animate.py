@@ -28,7 +28,7 @@ from arapfields._native import InvalidInput
 from arapfields.cli.files import read_mesh
 from arapfields.cli.frame_solver import STEPS, TOLERANCE
 from arapfields.cli.frames import FrameStore
-from arapfields.cli.tracks import read_tracks
+from arapfields.cli.handles import read_tracks
 from arapfields.cli.usd import write_usd
 
 # `arapfields animate`: each frame its own, the same by shards, after kills, in every format.

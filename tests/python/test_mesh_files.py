@@ -15,8 +15,7 @@ from support.programs.cli import run
 import arapfields as af
 from arapfields.cli import files
 from arapfields.cli.meshes import formats, stl
-from arapfields.cli.meshes.mesh import Mesh
-from arapfields.cli.meshes.triangulation import triangulated
+from arapfields.cli.meshes.mesh import Mesh, triangulated
 
 FILES = odd_meshes.all_files()
 SINGLE = 2.0**-24  # relative rounding of single precision

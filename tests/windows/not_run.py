@@ -39,9 +39,9 @@ PYTHON = {
 }
 BLENDER = {
     "test_commands.py::test_a_full_disk_is_named_and_changes_nothing": LIMITS,
-    "test_bake_failures.py::test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays": LIMITS,
-    "test_export_animation.py": USD,
-    "test_modifier_alone.py": "it starts Blenders of this system",
+    "test_bake.py::test_whatever_goes_wrong_is_named_and_the_last_good_cache_stays": LIMITS,
+    "test_export.py": USD,
+    "test_extension.py": "it starts Blenders of this system",
     "test_commands.py::test_ctrl_c_leaves_no_partial_file": CTRL_C,
     "test_commands.py::test_a_batch_that_is_killed_takes_its_blenders_along": PROC,
 }

@@ -4,16 +4,98 @@
 Energies are the unit cube's, lengths the mesh's. `report["bend"]` reads report.bend; to_dict() is for JSON.
 """
 
+import dataclasses
+import functools
+import json
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Generic, Literal, NamedTuple, Self, TypeAlias, TypeVar
+from types import MappingProxyType
+from typing import Any, ClassVar, Generic, Literal, NamedTuple, Self, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from ._contact_report import ContactReport as ContactReport
-from ._contact_report import HeldBack as HeldBack
-from ._report import Iteration as Iteration
-from ._report import Report as Report
+# The base class of reports, and the argument of callbacks.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """A frozen set of measurements; `report["bend"]` reads report.bend."""
+
+    kinds: ClassVar[dict[str, type["Report"]]] = {}
+
+    def __init_subclass__(cls) -> None:
+        Report.kinds[cls.__name__] = cls
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self.keys():
+            raise KeyError(name)
+        return getattr(self, name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    @classmethod
+    def keys(cls) -> tuple[str, ...]:
+        """The fields' names, in order."""
+        return tuple(field.name for field in dataclasses.fields(cls))
+
+    def to_dict(self) -> dict[str, Any]:
+        """{name: value}, values of plain types: numbers, strings, lists and dicts."""
+        plain: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(self)))
+        return plain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Iteration:
+    """The argument of a callback, after each iteration."""
+
+    iteration: int
+    """Number of completed iterations, from 1."""
+    loss: float
+    """The loss estimated in this iteration."""
+    terms: Mapping[str, float]
+    """The weighted terms, which sum to the loss; see deform, stylize and fit_sdf for their names."""
+    seconds: float
+    """Time since the start of the iterations."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "terms", MappingProxyType(dict(self.terms)))
+
+    def __reduce__(self) -> tuple[Any, tuple[()]]:
+        given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return functools.partial(type(self), **(given | {"terms": dict(self.terms)})), ()
+
+
+# Classes of reports on contact.
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldBack(Report):
+    """A handle that contact prevents from reaching its target."""
+
+    handle: int
+    by: str
+    """Such as "obstacles[0]" or "ground"."""
+    distance: float
+    """Mean distance to the target, in mesh units."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactReport(Report):
+    """Contact of a solved surface."""
+
+    deepest: float
+    """Largest penetration of a sample beyond an obstacle's margin, in mesh units."""
+    touching: float
+    """Share of the area in contact."""
+    held: tuple[HeldBack, ...]
+    crossing: tuple[str, ...]
+    """Obstacles, such as "obstacles[0]", that cross the surface at rest; points inside them stay."""
+    self_intersections: int | None
+    """Pairs of the mesh's triangles that pass through each other and do not at rest, of parts that are far
+    from each other there. None without `itself`, for samples that know no mesh, and after step()."""
+
 
 StoppedBy: TypeAlias = Literal["iterations", "time_budget", "target_error", "callback", "diverged"]
 

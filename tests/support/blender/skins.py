@@ -1,13 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A body with two legs, an armature, cloth and an eye, for skinning."""
+"""Characters with bones, and their skins."""
 
 import bpy
 import numpy as np
 from support.blender import scenes
+from support.blender.stacks import add_modifier, armature
 from support.geometry.characters import FOOT, HIP, LEG, trousers
 from support.geometry.nudge import nudged
 
 import arapfields as af
+from addon.blender import mesh_arrays, vertex_groups
+from addon.core.geometry.spaces import space_of
+from addon.core.runtime.coroutines import run_to_completion
+from addon.handles import empties
+from addon.handles.native_handles import native_handles
+
+# A body with two legs, an armature, cloth and an eye, for skinning.
 
 KNEE = 0.38
 SIDES = "LR"
@@ -77,3 +85,28 @@ def weights_of(item, names):
             if entry.group in columns:
                 result[vertex.index, columns[entry.group]] = entry.weight
     return result
+
+
+# Native handles of bones.
+
+
+def handles_of(bar):
+    """[(indices of its samples, its (4, 4) motion)] of the bar's native handles."""
+    space, mesh = space_of(bar.matrix_world), mesh_arrays.read(bpy.context, bar, in_place=True)
+    reading = vertex_groups.read_weights(bpy.context, bar, empties.group_names(bar), in_place=True)
+    handles = empties.solve_handles(bar, space, run_to_completion(reading))
+    samples = af.sample_mesh(space.to_solve(mesh.vertices), mesh.triangles, count=2000, seed=0)
+    return [(native.samples, native.motion) for native in native_handles(af, handles, mesh, samples)]
+
+
+def rigged_bar(with_groups=True):
+    """(bar, rig): a bar and an armature of two bones, which deforms it by a modifier `with_groups`."""
+    bar = scenes.bar()
+    if with_groups:
+        add_modifier(bar, "ARMATURE")
+        rig = bar.modifiers["Armature"].object
+    else:
+        rig = armature()
+    rig.pose.bones["Second"].rotation_euler.z = 0.0
+    scenes.activate(rig, bar)
+    return bar, rig

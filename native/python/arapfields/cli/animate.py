@@ -16,10 +16,10 @@ from ..point_cache import PointCacheWriter
 from . import files, usd
 from .frame_solver import FrameSolver, frames_wanted
 from .frames import FrameStore
+from .handles import read_tracks
 from .options import given_options
 from .running import Outputs, with_progress
 from .splat_frames import animate_splats
-from .tracks import read_tracks
 
 LINES = 15.0  # seconds between lines of progress without a terminal
 

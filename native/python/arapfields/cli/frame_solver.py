@@ -7,8 +7,8 @@ import numpy as np
 
 import arapfields as af
 
+from .flags import contact_key, contact_of
 from .options import given_options, result_options
-from .touching import contact_key, contact_of
 
 STEPS, TOLERANCE = 300, 1e-6  # defaults for frames, which are solved from rest
 

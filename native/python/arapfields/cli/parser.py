@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The verbs, their flags and their help."""
+"""The parser of the command line."""
 
 import argparse
 import re
@@ -7,6 +7,7 @@ from functools import partial
 
 import arapfields as af
 
+from .._streams import say
 from . import skinning, transferring, verbs, wrapping
 from .animate import animate
 from .describe import Describe
@@ -14,6 +15,7 @@ from .flags import (
     MESH,
     SOURCE,
     SPLATS,
+    contact_flags,
     extraction_flags,
     inverse_flag,
     report_flag,
@@ -22,9 +24,24 @@ from .flags import (
     style_flags,
     up_axis_flag,
 )
-from .one_line import OneLineParser
 from .options import add_option_flag, add_option_flags, shard
-from .touching import contact_flags
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """An ArgumentParser that prints errors in one line, with exit code 2, and names the verb's help."""
+
+    def error(self, message):
+        say(f"{self.prog}: {message} (see {self.prog} --help)")
+        raise SystemExit(2)
+
+    def parse_known_args(self, args=None, namespace=None):
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
+
+# The verbs, their flags and their help.
 
 EXIT_CODES = {0: "done", 1: "failed", 2: "bad input or usage", 130: "interrupted"}
 

@@ -12,8 +12,8 @@ from .._files import existing_file, read_text, write_arrays
 from . import files, verbs
 from .flags import MESH, stiffness_flags
 from .options import add_option_flags, given_options
-from .points import read_weights
 from .running import Outputs, with_progress
+from .sources import read_weights
 
 NAME = "skin"
 SUMMARY = "weights of a mesh for the bones of an armature, and correctives"

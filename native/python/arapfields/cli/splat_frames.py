@@ -12,9 +12,9 @@ from .._files import whole_file
 from .._streams import say
 from . import splat_files, usd
 from .frame_solver import FrameSolver, frames_wanted
+from .handles import read_tracks
 from .options import given_options
 from .running import Outputs, with_progress
-from .tracks import read_tracks
 
 SAMPLES = 6000
 

@@ -13,8 +13,8 @@ from . import files, sources, verbs, wrap_folder, wrap_sequence
 from .flags import SOURCE, report_flag, sdf_flag, stiffness_flags
 from .handles import triple
 from .options import add_option_flags, given, given_options, shard
-from .points import read_numbers
 from .running import Outputs, with_progress
+from .sources import read_numbers
 
 NAME = "wrap"
 SUMMARY = "lay a shape onto another, as rigidly as possible"
