@@ -25,6 +25,7 @@ FIGURES = [
     Figure("exact", "deforming", "soft and exact handles"),
     Figure("styles", "styling", "six styles of three shapes, with their preferences on a sphere"),
     Figure("style_sheet", "styling", "all styles of six shapes, as stylize makes them by default"),
+    Figure("style_finish", "styling", "two shapes in two styles, by the field alone and finished"),
     Figure("style_objects", "styling", "three shapes in the styles of six objects"),
     Figure("live", "deforming", "six frames of a handle dragged live", timed=True),
     Figure("character", "styling", "materials and UVs of a deformed and a stylized mesh"),

@@ -162,6 +162,40 @@ def draw_style_sheet(output):
     return results
 
 
+# The finish on the mesh: shapes in two styles, by the field alone and finished.
+
+FINISH_ROWS, FINISH_STYLES = ("dog", "dinosaur"), ("cube", "dodecahedron")
+
+
+def draw_style_finish(output):
+    turns, paths, results = dict(SHEET_ROWS), [], {}
+    ends = [(-0.5 * SHEET_SPACING, 0.0, 0.5), (4.5 * SHEET_SPACING, 0.0, 0.5)]
+    before = {"centers": af.CENTERS_BEFORE_SHARPEN, "iterations": af.ITERATIONS_BEFORE_SHARPEN}
+    for name in FINISH_ROWS:
+        rest = shape(name)
+        samples = samples_of(rest, SHEET_SAMPLES)
+        stage.clear()
+        shown, column = [add(rest, name, in_column(rest, rest, 0, turns[name], SHEET_SPACING))], 0
+        for style in FINISH_STYLES:
+            alone = warped(rest, af.stylize(samples, style))
+            field = af.stylize(samples, style, af.StylizeOptions(**before))
+            moved = af.sharpen(
+                rest.vertices, rest.triangles, warped(rest, field).vertices, style, up=[0, 0, 1]
+            )
+            for label, made in (("field alone", alone), ("finished", rest._replace(vertices=moved))):
+                column += 1
+                shown.append(add(made, label, in_column(made, rest, column, turns[name], SHEET_SPACING)))
+                if name == FINISH_ROWS[0]:
+                    place = (SHEET_SPACING * column, 0.2, 2.05)
+                    shown.append(stage.caption(f"{style}, {label}", place, 0.2))
+            folded = len(af.folded_triangles(rest.vertices, rest.triangles, moved))
+            results[f"{name}, {style}"] = {"folded": folded}
+        paths.append(output / f"style-finish-{name}.png")
+        stage.photograph(shown, paths[-1], elevation=12, around=ends, margin=0.01)
+    stack(paths, output / "style-finish.png")
+    return results
+
+
 # Styles read off objects: a column an object, shown on top, a row a shape, all options by default.
 
 OBJECTS_SPACING, SAMPLES = 2.1, 6000

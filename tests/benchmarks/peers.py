@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Public code of others on the same constraints as ours: make bench PEERS=path.
 
-PEERS holds checkouts of dbaieri/implicit-arap and ugogon/gaussStylization; Blender's own deformers are
-those of .venv. All are measured at the same vertices. Moved vertices stay in build/bench/peers, for pictures.
+PEERS holds checkouts of dbaieri/implicit-arap and ugogon/gaussStylization, and of
+alecjacobson/common-3d-test-models for a cow in styles; Blender's own deformers are those of .venv. All are
+measured at the same vertices. Moved vertices stay in build/bench/peers, for pictures.
 """
 
 import os
@@ -13,7 +14,7 @@ import numpy as np
 import arapfields as af
 
 from . import shapes
-from .peer import registration, theirs, weights, yardstick
+from .peer import registration, styles, theirs, weights, yardstick
 from .peer.problems import awkward, of_figures
 from .peer.theirs import Refused
 
@@ -22,7 +23,6 @@ from .peer.theirs import Refused
 MINUTES = float(os.environ.get("PEERS_MINUTES", "20"))
 PATCHES_A_MINUTE = 7.5
 LEAST_PATCHES = 60, 10  # on the surface each point of a handle has one
-LAMBDAS = (1.0, 4.0, 16.0)  # of gaussStylization; its own example has 4
 CUBE = np.vstack([np.eye(3), -np.eye(3)])
 METHODS = {"Laplacian Deform": "laplacian", "Lattice": "lattice", "Surface Deform": "surface"}  # Blender's
 CAGE = 24  # cells a side of Surface Deform's cage
@@ -153,36 +153,6 @@ def constraint_rows(problem, checkout):
         }
 
 
-def style_rows(checkout):
-    """The published cow, or our dog, towards a cube."""
-    module = theirs.built_gauss(checkout)
-    vertices, triangles = shapes.mesh("spot")
-    what = f"{shapes.label('spot')} to a cube"
-    for strength in LAMBDAS:
-        moved, seconds, steps = theirs.gauss(module, vertices, triangles, CUBE, strength, "spot")
-        yield {
-            "what": what,
-            "by": f"gaussStylization, λ = {strength:g}",
-            "iterations": steps,
-            "cpu_s": round(seconds, 2),
-            **yardstick.styled(vertices, triangles, moved, CUBE),
-        }
-    for strength in (0.3, 0.6, 1.0):
-
-        def styled(strength=strength):
-            samples = af.sample_mesh(vertices, triangles)
-            return af.stylize(samples, "cube", af.StylizeOptions(strength=strength))
-
-        field, seconds = clocked(styled)
-        yield {
-            "what": what,
-            "by": f"ours, strength {strength:g}",
-            "iterations": field.report["iterations"],
-            "cpu_s": round(seconds, 2),
-            **yardstick.styled(vertices, triangles, field(vertices), CUBE),
-        }
-
-
 def by_blender(method):
     def moved(problem):
         return theirs.blender(problem, method, cage_of(problem) if method == "surface" else None)[0]
@@ -240,7 +210,7 @@ def awkward_rows(checkout):
 
 def run():
     arap, style = (theirs.folder() / name for name in theirs.CODES)
-    quick = [*style_rows(style), *awkward_rows(style), *weights.rows(), *registration.rows()]
+    quick = [*styles.rows(style), *awkward_rows(style), *weights.rows(), *registration.rows()]
     rows = [row for problem in of_figures().values() for row in constraint_rows(problem, arap)]
     rows += quick
     rows += [{"code": path.name, "commit": theirs.commit(path)} for path in (arap, style)]

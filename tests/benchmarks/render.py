@@ -66,6 +66,10 @@ HEADINGS = {
     "by": "",
     "folded_percent": "folded, %",
     "mean_angle": "mean angle to the style, degrees",
+    "their_cpu_s": "theirs, processor s",
+    "their_mesh_energy": "theirs, energy of the mesh",
+    "their_mean_angle": "theirs, mean angle to the style, degrees",
+    "angle_at_their_energy": "angle at their energy",
     "within_10_percent": "area within 10°, %",
     "others_percent": "other fingertips, % of the length",
 }
