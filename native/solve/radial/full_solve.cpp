@@ -230,6 +230,15 @@ struct Unfolding {
   std::function<bool()> anew = {};
 };
 
+/// Whether a field folds fewer triangles of the samples' mesh than another, or stretches as many less.
+bool is_better(const DeformationField& before, const DeformationField& now, const SurfaceSamples& samples) {
+  if (!samples.mesh) return true;
+  const MeshMeasures was = measure_triangles(before, *samples.mesh);
+  const MeshMeasures is = measure_triangles(now, *samples.mesh);
+  return is.folded < was.folded ||
+         (is.folded == was.folded && is.distortion.max_stretch < was.distortion.max_stretch / beyond_samples);
+}
+
 /// Solves in rounds while the field folds or stretches at samples or triangles. Returns the measures of the
 /// samples' mesh in the end.
 std::optional<MeshMeasures> unfold(RadialSolver& solver, const SurfaceSamples& samples,
@@ -340,7 +349,9 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
       loop.history.emplace_back(loop.iterations + iterations, value);
     loop.iterations += again.iterations;
     loop.seconds += again.seconds;
-    if (measure(*shown(), samples, terms).arap.energy <= FullSolve::dearer * energy) return true;
+    if (is_better(*before, *shown(), samples) &&
+        measure(*shown(), samples, terms).arap.energy <= FullSolve::dearer * energy)
+      return true;
     kept = before;
     return false;
   };
