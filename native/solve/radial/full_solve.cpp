@@ -236,7 +236,8 @@ bool is_better(const DeformationField& before, const DeformationField& now, cons
   const MeshMeasures was = measure_triangles(before, *samples.mesh);
   const MeshMeasures is = measure_triangles(now, *samples.mesh);
   return is.folded < was.folded ||
-         (is.folded == was.folded && is.distortion.max_stretch < was.distortion.max_stretch / beyond_samples);
+         (is.folded == was.folded &&
+          is.distortion.max_stretch < was.distortion.max_stretch / FullSolve::beyond_samples);
 }
 
 /// Solves in rounds while the field folds or stretches at samples or triangles. Returns the measures of the
