@@ -9,10 +9,12 @@ flags of the command line, `<!-- buttons: addon -->` for all operators.
 import ast
 import importlib.util
 import re
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 ADDON = ROOT / "addon"
+sys.path.append(str(ROOT))
 MARK = re.compile(r"<!-- (settings|flags|shown|buttons): ([\w/]+)(?:\.py)? -->")
 
 
@@ -72,7 +74,7 @@ def shown(file):
         for kind in ("panel", "tool", "preferences")
         for path in ADDON.rglob(f"{kind}.py")
     )
-    choices, names, rows = loaded(ADDON / "core" / "settings" / "choices.py"), {}, {}
+    choices, names, rows = importlib.import_module("addon.core.settings.choices"), {}, {}
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and isinstance(node.body[-1], ast.Return):
             names[node.name] = node.body[-1].value
