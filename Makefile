@@ -188,7 +188,8 @@ SCENES := 2000
 FIRST := 0
 fuzz-contact: setup  ## 2,000 random scenes in contact under the address and undefined-behaviour sanitizers; SCENES=count FIRST=number: others
 	$(COMPILER)
-	$(SANITIZED) -B build/sanitize-eigen -DARAPFIELDS_SANITIZE=address,undefined -DARAPFIELDS_BACKEND=eigen -DARAPFIELDS_PYTHON=OFF
+	$(SANITIZED) -B build/sanitize-eigen -DARAPFIELDS_SANITIZE=address,undefined -DARAPFIELDS_BACKEND=eigen -DARAPFIELDS_PYTHON=OFF \
+	  -DARAPFIELDS_NATIVE_SUITES=contact
 	$(VENV)/bin/cmake --build build/sanitize-eigen --target native_tests
 	UBSAN_OPTIONS=print_stacktrace=1 ARAPFIELDS_CONTACT_SCENES="$(FIRST) $(SCENES)" build/sanitize-eigen/tests/native_tests --run_test=contact/scenes
 

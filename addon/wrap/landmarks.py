@@ -117,30 +117,22 @@ def shown_place(source, place):
     if modifier_stack.top(source) is None or source.mode == "EDIT":
         return place
     local = transform(inverse(world), place[None])[0]
-    return place + world[:3, :3] @ layers.offset_at(source, nearest.vertex(source, local))
+    return place + world[:3, :3] @ layers.offset_at(source, nearest_vertex(source, local))
 
 
-class Nearest:
-    """The vertices that were looked for last, since views are drawn again and again."""
-
-    def __init__(self):
-        self.known = {}  # {(session_uid of the object, number of vertices, place): index}
-
-    def vertex(self, source, local):
-        """The index of a mesh's vertex nearest to a place, in local coordinates."""
-        key = source.session_uid, len(source.data.vertices), tuple(local.round(6).tolist())
-        if key not in self.known:
-            if len(self.known) > MOST_KNOWN:
-                self.known.clear()
-            away = ((mesh_arrays.positions(source.data) - local) ** 2).sum(axis=1)
-            self.known[key] = int(away.argmin())
-        return self.known[key]
-
-    def clear(self):
-        self.known.clear()
+# Vertices by (session_uid of the object, number of vertices, place): views are drawn again and again.
+nearest = {}
 
 
-nearest = Nearest()
+def nearest_vertex(source, local):
+    """The index of a mesh's vertex nearest to a place, in local coordinates."""
+    key = source.session_uid, len(source.data.vertices), tuple(local.round(6).tolist())
+    if key not in nearest:
+        if len(nearest) > MOST_KNOWN:
+            nearest.clear()
+        away = ((mesh_arrays.positions(source.data) - local) ** 2).sum(axis=1)
+        nearest[key] = int(away.argmin())
+    return nearest[key]
 
 
 def mirror(context, source):

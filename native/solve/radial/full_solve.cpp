@@ -223,7 +223,8 @@ struct Unfolding {
   double barrier = 0.0;  ///< weight of the fold barrier
   int rounds = 0, steps = 0;
   bool all_samples = false;  ///< look at all samples; else only where the mesh or the energy samples fold
-  bool stretches = false;    ///< whether stretches count
+  bool of_mesh = false;  ///< folds and stretches of the mesh's own triangles count; a style's are mended by
+                         ///< its finish
   /// Solves anew in `rounds_anew`, without a barrier, and returns whether that is to be kept; empty: goes on
   /// from the present shape. Where nothing held the field it may be so far off that descent from there is
   /// slow, and behind the barrier stuck.
@@ -246,7 +247,7 @@ std::optional<MeshMeasures> unfold(RadialSolver& solver, const SurfaceSamples& s
                                    const SurfaceOptions& surface, const Unfolding& how, const Shown& shown,
                                    const Progress& progress) {
   DistortionLimits limits{surface.barrier_threshold};
-  if (how.stretches)
+  if (how.of_mesh)
     limits.most_stretch =
         std::max(FullSolve::most_stretch, FullSolve::beyond_samples * solver.report().distortion.max_stretch);
   std::optional<MeshMeasures> seen;
@@ -254,7 +255,7 @@ std::optional<MeshMeasures> unfold(RadialSolver& solver, const SurfaceSamples& s
   for (int round = 0;; ++round) {
     const std::shared_ptr<const DeformationField> now = shown();
     if (samples.mesh) seen = measure_triangles(*now, *samples.mesh, limits);
-    const bool is_wrong = seen && seen->is_wrong;
+    const bool is_wrong = how.of_mesh && seen && seen->is_wrong;
     if (round == rounds || !(how.all_samples || is_wrong || solver.report().distortion.flipped_share > 0.0))
       break;
     const bool is_anew = round < FullSolve::rounds_anew && how.anew;
@@ -335,7 +336,7 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   Unfolding how{FullSolve::unfolding * std::max(options.surface.barrier, FullSolve::least_barrier)};
   how.rounds = was_ended(loop) || hooks.contact ? 0 : FullSolve::unfolding_rounds;
   how.steps = std::min(FullSolve::unfolding_iterations, options.training.iterations);
-  how.stretches = true;
+  how.of_mesh = true;
   RadialReport solved;  // of `kept`
   how.anew = [&] {
     solved = solver.report();
