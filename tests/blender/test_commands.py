@@ -28,6 +28,7 @@ if IN_BLENDER:
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = ["--iterations", "20", "--samples", "1000", "--batch", "100", "--width", "16", "--layers", "1"]
+ENDLESS = [*QUICK, "--field", "neural", "--iterations", "100000"]
 HOLD_AND_LIFT = {
     "handles": [
         {"type": "cuboid", "corners": [[None, None, None], [-0.5, None, None]]},
@@ -142,7 +143,7 @@ def test_a_batch_that_is_killed_takes_its_blenders_along(user_folder, tmp_path):
     (tmp_path / "in").mkdir()
     write_ball(tmp_path / "in/ball.ply")
     call = [sys.executable, str(ROOT / "blender_scripts/batch.py"), "--style", "cube", "--input"]
-    call += [str(tmp_path / "in"), "--output", str(tmp_path / "out"), *QUICK, "--iterations", "100000"]
+    call += [str(tmp_path / "in"), "--output", str(tmp_path / "out"), *ENDLESS]
     process = subprocess.Popen(call, env=user_folder, stdout=subprocess.PIPE, text=True)
     while "files to do" not in process.stdout.readline():
         assert process.poll() is None
@@ -210,7 +211,7 @@ def test_ctrl_c_leaves_no_partial_file(user_folder, tmp_path):
     (tmp_path / "in").mkdir()
     write_ball(tmp_path / "in/ball.ply")
     call = [sys.executable, str(ROOT / "blender_scripts/batch.py"), "--style", "cube", "--input"]
-    call += [str(tmp_path / "in"), "--output", str(tmp_path / "out"), *QUICK, "--iterations", "100000"]
+    call += [str(tmp_path / "in"), "--output", str(tmp_path / "out"), *ENDLESS]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     process = subprocess.Popen(call, env=user_folder, **pipes)
     while "files to do" not in process.stdout.readline():
