@@ -152,10 +152,9 @@ def test_a_sleeve_that_a_shrinkwrap_lays_on_the_body_does_not_move_twice():
     assert bpy.ops.arapfields.carry() == {"FINISHED"}
     moving.location.z += 0.4
     bpy.context.view_layer.update()
-    assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}
+    assert bpy.ops.arapfields.deform(samples=1000) == {"FINISHED"}
     assert [one.type for one in sleeve.modifiers] == ["NODES", "SHRINKWRAP"]
-    off = np.abs(away() - before)
-    assert np.quantile(off, 0.99) < 0.02  # beside the bar's edges a vertex may be laid on the next face
+    assert np.abs(away() - before).max() < 0.02
     bpy.ops.arapfields.release(all=True)
     assert [one.type for one in sleeve.modifiers] == ["SHRINKWRAP"]
 
