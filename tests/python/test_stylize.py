@@ -139,7 +139,7 @@ def test_spot_becomes_a_cube(data_dir):
     report = af.stylize(samples, "cube", af.StylizeOptions(gauss_weight=2.0, iterations=300)).report
     assert report.preference >= 0.90
     full = af.stylize(samples, "cube", af.StylizeOptions()).report
-    assert full["preference"] >= 0.955 and full["flipped_share"] <= 0.001
+    assert full["preference"] >= 0.96 and full["flipped_share"] <= 0.001
 
 
 @pytest.mark.slow
