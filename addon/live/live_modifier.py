@@ -24,11 +24,11 @@ class LiveModifier:
         self.was_silent = bool(settings_of(source).silenced)
         self.was_playing = cache_modifier.is_playing(source)
         self.bind(context, source)
+        visibility.show_alone(source, source, for_now=True)
 
     def bind(self, context, source):
         """Binds the modifier, also after an edit of the source; `before` stays as it is."""
         motion.bind(context, source, live=True)
-        visibility.show_alone(source, source, for_now=True)
 
     def is_there(self):
         return True
