@@ -63,8 +63,7 @@ class LiveModifier:
             if source.mode != "EDIT":
                 motion.restore(source, self.before)
                 motion.drop_empty_helper(source)
-                if self.before is not None:
-                    settings_of(source).moved_by = self.moved_by
+                settings_of(source).moved_by = self.moved_by
                 if not self.was_silent:
                     armatures.restore(source)
                 if self.was_playing:

@@ -167,6 +167,23 @@ def test_a_live_object_behind_its_extracted_surface_stays_hidden_under_undo():
         end()
 
 
+def test_live_mode_that_is_refused_leaves_what_the_file_says():
+    """Also where the user has removed the modifier whose motion had a name."""
+    end = world.few_centers()
+    try:
+        build()
+        bar = bpy.data.objects["Bar2"]
+        take("deform", bar)
+        bar.modifiers.remove(bar.modifiers["ARAP Fields"])
+        bar.arapfields.handles[0].weight = 0.0
+        scenes.activate(bar)
+        with pytest.raises(RuntimeError, match="weight"):
+            bpy.ops.arapfields.live()
+        assert bar.arapfields.moved_by == "DEFORM" and not bar.arapfields.live_kind
+    finally:
+        end()
+
+
 def test_a_shape_comes_back_by_undo_after_its_helper_was_emptied():
     """Without the modifier the offsets lie on the mesh, and the helper's own are gone, which no step has."""
     end = world.few_centers()
