@@ -96,9 +96,10 @@ class Session:
         )
 
     def advance(self):
-        """Continues to read for a moment; True once the worker is started."""
+        """Continues to read for a moment, to the end where a shape is to be held, which is said before the
+        step of undo; True once the worker is started."""
         if self.worker is None:
-            step_for(self._reading)
+            (run_to_completion if self.is_held else step_for)(self._reading)
         return self.worker is not None
 
     def wait(self, seconds, refined):

@@ -167,6 +167,29 @@ def test_a_live_object_behind_its_extracted_surface_stays_hidden_under_undo():
         end()
 
 
+def test_a_shape_held_by_an_anchor_is_in_the_step_of_the_press():
+    end = world.few_centers()
+    try:
+        world.build()
+        ball = bpy.data.objects["Ball"]
+        scenes.activate(ball)
+        assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
+        world.settle()
+        ball.arapfields.stylize.use_handles = True
+        world.settle()
+        shown = scenes.world_points(ball)
+        pin(ball, shown[0], 0.3, anchor=True)
+        bpy.ops.ed.undo_push(message="anchor")
+        assert ball.arapfields.held  # before any timer
+        world.settle()
+        bpy.ops.ed.undo_push(message="another step")
+        bpy.ops.ed.undo()
+        world.settle()
+        assert np.array_equal(scenes.world_points(bpy.data.objects["Ball"]), shown)
+    finally:
+        end()
+
+
 def test_live_mode_that_is_refused_leaves_what_the_file_says():
     """Also where the user has removed the modifier whose motion had a name."""
     end = world.few_centers()
