@@ -17,8 +17,7 @@ import pytest
 import trimesh
 from support.files.archives import names
 from support.files.full_disk import files_of_at_most
-from support.geometry.bar import LEFT, RIGHT, turned
-from support.geometry.meshes import sphere
+from support.geometry.meshes import LEFT, RIGHT, sphere, turned
 from support.programs.cli import process, run
 
 import arapfields as af
