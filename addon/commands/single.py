@@ -1,22 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """deform and stylize of one file, with an outcome for each of its objects."""
 
-import contextlib
 import json
 import re
 import sys
-import threading
 import time
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
+from arapfields.cli.command_line import shown_progress
+
 from ..blender.language import about
 from ..blender.object_references import is_source, settings_of
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
-from ..core.runtime.threads import start_thread
 from ..core.settings.choices import style_identifier
 from ..handles import empties, naming
 from ..names import REPORT
@@ -181,30 +180,6 @@ def write_json(path, content):
     write_text(path, json_text(content, indent=1))
 
 
-@contextlib.contextmanager
 def progress(quiet):
-    """Reports progress: a bar on a terminal, else a line now and then."""
-    ended = threading.Event()
-    live = sys.stderr.isatty()
-
-    def draw():
-        while not ended.wait(0.2 if live else 15.0):
-            share, text = jobs.progress()
-            if live:
-                print(
-                    f"\r[{'#' * round(24 * share):24}] {share:4.0%} {text[:60]:60}", end="", file=sys.stderr
-                )
-            else:
-                print(f"{share:4.0%} {text}", file=sys.stderr, flush=True)
-
-    if quiet:
-        yield
-        return
-    thread = start_thread("progress", draw)
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
-        if live:
-            print(f"\r{'':96}\r", end="", file=sys.stderr, flush=True)
+    """Context manager that reports progress: a bar on a terminal, else a line now and then."""
+    return shown_progress(jobs.progress, quiet=quiet, apart=15.0)

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import bpy
 
+from arapfields.cli.command_line import name_and_margin
+
 from ..blender.object_references import settings_of
 from ..contact.obstacles import add
 from ..core.errors import UserError
@@ -13,17 +15,11 @@ from .files import READ
 
 
 def parts(text):
-    """(name, margin) of "name:margin"; names may contain colons."""
-    name, colon, margin = text.rpartition(":")
-    try:
-        value = float(margin)
-    except ValueError:
-        return text, 0.0
-    if not colon or text in bpy.data.objects:
-        return text, 0.0
-    if not 0.0 <= value < math.inf:
+    """(name, margin) of "name:margin"."""
+    name, margin = name_and_margin(text, lambda whole: whole in bpy.data.objects)
+    if not 0.0 <= margin < math.inf:
         raise UserError(f"--obstacle: {text}: the margin is negative, or no number")
-    return name, value
+    return name, margin
 
 
 def named(options):

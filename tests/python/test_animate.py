@@ -24,8 +24,8 @@ import arapfields as af
 from arapfields._files import whole_file
 from arapfields._locks import lock
 from arapfields._native import InvalidInput
+from arapfields.cli.animate import STEPS, TOLERANCE
 from arapfields.cli.files import read_mesh
-from arapfields.cli.frame_solver import STEPS, TOLERANCE
 from arapfields.cli.frames import FrameStore
 from arapfields.cli.handles import read_tracks
 from arapfields.cli.usd import write_usd
