@@ -14,11 +14,11 @@ from ..blender.selection import choose_row
 from ..core.errors import UserError, refuse
 from ..core.geometry.handles import far_handle, solve_handle
 from ..core.geometry.spaces import Space, inverse, space_of, transform
-from ..core.runtime.coroutines import run_to_completion
+from ..core.runtime.jobs import run_to_completion
 from ..names import HANDLES, HANDLES_MARK
 from . import movers, naming, symmetry
 from .movers import box_now, current_box, has_mover, matrix_of, name_of
-from .palette import free_colour
+from .naming import free_colour
 
 
 def rest_box(source, entry, where=matrix_of):

@@ -12,7 +12,7 @@ import bpy
 from ..blender.host import has_window, redraw
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
-from ..core.runtime.coroutines import run_to_completion, step_for
+from ..core.runtime.jobs import run_to_completion, step_for
 from ..core.runtime.threads import REST, LatestRequestWorker
 from ..field_modifier import layers, unseen
 from ..results import placement, visibility
@@ -22,9 +22,8 @@ from ..solver.frame_solver import Shape
 from ..solver.request import Request
 from ..solver.source_reader import SourceChanged, SourceReader
 from . import stored
-from .display import Former, display_of
 from .edits import EditWatch, differ_in_handles, layout_of
-from .live_modifier import PAUSING
+from .live_modifier import PAUSING, Former, display_of
 from .live_solver import PACE, LiveSolver
 from .playback import Playback, scene_frame
 
@@ -84,7 +83,7 @@ class Session:
         return self.reader.carrying
 
     def _start(self, context):
-        """Coroutine (core/coroutines.py) that reads the vertex groups, then starts the worker."""
+        """Coroutine (core/runtime/jobs.py) that reads the vertex groups, then starts the worker."""
         yield from self.reader.read_setup(context)
         has_motion = secondary_motion.is_used(self.source.get())
         self.worker = LatestRequestWorker(

@@ -18,7 +18,7 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.field_modifier import motion
     from addon.handles import empties, left_behind
-    from addon.handles.palette import PALETTE, free_colour
+    from addon.handles.naming import PALETTE, free_colour
     from addon.live import sessions
     from addon.live.prefetch import prefetch
     from addon.pin_tool import drag, hints, hover, pins, places, screen

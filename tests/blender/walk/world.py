@@ -10,7 +10,7 @@ from support.blender import scenes
 
 from addon.blender import mesh_arrays, modifier_stack, user_preferences
 from addon.blender.object_references import owner_of, settings_of
-from addon.core.runtime.coroutines import run_to_completion
+from addon.core.runtime.jobs import run_to_completion
 from addon.live import sessions
 from addon.results import placement
 from addon.solver import frame_solver, setup
