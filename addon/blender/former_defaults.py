@@ -15,7 +15,10 @@ GROWTH = 80.0  # of the even strength's weight; before, the strength was the sha
 
 
 def begin(settings):
-    """The settings of an object that gets its first handle have the newest defaults."""
+    """The settings of an object that gets its first handle have the newest defaults, and no former rule."""
+    if settings.keep_rest or settings.hold_far:
+        settings.keep_rest = settings.hold_far = False
+        settings.deform.property_unset("locality")
     settings.defaults = NEWEST
 
 

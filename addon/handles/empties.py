@@ -125,6 +125,13 @@ def kept_rest(source):
     return (), 0.0
 
 
+def are_loose_pins(source):
+    """Whether all handles are pins, none is an anchor, and nothing else is kept at rest."""
+    entries = used(source)
+    loose = all(entry.kind in PINS and not entry.anchor for entry in entries)
+    return bool(entries) and loose and not len(kept_rest(source)[0])
+
+
 PINS = ("PIN", "POINT")  # these hold location and rotation, and location only
 SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS", "PIN": "SPHERE"}
 

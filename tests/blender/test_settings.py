@@ -237,6 +237,22 @@ def test_a_new_file_keeps_the_newest(tmp_path):
     assert reopened(tmp_path, former_defaults.NEWEST).deform.locality == pytest.approx(USUAL)
 
 
+def test_keep_the_rest_of_an_older_file_stays_until_its_handles_are_gone(tmp_path):
+    bar, *_ = scenes.bar_with_handles()
+    bar.arapfields.defaults, bar.arapfields.keep_rest, name = 0, True, bar.name
+    file = str(tmp_path / "bar.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    bar = bpy.data.objects[name]
+    assert bar.arapfields.keep_rest and bar.arapfields.deform.locality == 0.0
+    scenes.activate(bar)
+    for _ in range(len(bar.arapfields.handles)):
+        bpy.ops.arapfields.remove_handle(delete=True)
+    bpy.ops.arapfields.pin_add(location=(1, 0, 0.25), radius=0.2)
+    assert not bar.arapfields.keep_rest
+    assert bar.arapfields.deform.locality == pytest.approx(USUAL)
+
+
 def test_an_object_without_handles_has_the_newest():
     bar = scenes.bar()
     former_defaults.keep()
