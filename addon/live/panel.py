@@ -14,10 +14,8 @@ from ..blender.section import (
     note,
     settings_column,
     switched,
-    wrapped,
 )
 from ..field_modifier import inputs, layers
-from ..handles import empties
 from ..names import Op
 from ..solver import secondary_motion
 from ..solver.frame_range import scene_range
@@ -115,9 +113,6 @@ class ARAPFIELDS_PT_secondary(Advanced, bpy.types.Panel):
         draw_settings(layout, group, "start")
         switched(layout, group, "use_ground", "ground")
         note(layout, vertex_groups.missing(source, secondary_motion.group_names(source)))
-        if group.use and empties.are_loose_pins(source):
-            hint = translated("Nothing is anchored, so all swings; Shift-click what stays with the pin tool")
-            wrapped(layout, hint, icon="INFO")
 
 
 CLASSES = [ARAPFIELDS_PT_secondary]

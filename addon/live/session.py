@@ -190,7 +190,11 @@ class Session:
             return stored.mark(source) != stored.UNSETTLED
         if self.is_restored:
             return False
-        return stored.mark(source) == stored.wanted(source, self.digest(self.reader.request(context)))
+        try:
+            now = self.digest(self.reader.request(context))
+        except SourceChanged:
+            return False
+        return stored.mark(source) == stored.wanted(source, now)
 
     def keep_shown(self):
         """With `keeps_shape`, makes the shape on display the one that stays when live mode ends."""

@@ -25,6 +25,7 @@ class Place:
     rest: np.ndarray  # (3,) in world space, of the shape before the field
     now: np.ndarray  # (3,) in world space, after the field
     turn: np.ndarray  # (3, 3) rotation of the surface there since rest
+    size: float  # of the shape at rest, in the object's units
     weights: dict  # {vertex group: mean weight of the points around it}
 
 
@@ -55,7 +56,8 @@ def find(context, source, location, radius, face=None, face_count=None):
             at_rest, moved = map_back(now, rest, chosen, location)
         about = around(rest, at_rest, radius)
         weights = group_weights(source, mesh, about)
-    return Place(at_rest, moved, best_rotation(rest[about], now[about]), weights)
+    size = float(np.linalg.norm(np.ptp(rest, axis=0)) / np.cbrt(abs(np.linalg.det(world[:3, :3])) or 1.0))
+    return Place(at_rest, moved, best_rotation(rest[about], now[about]), size, weights)
 
 
 def near(points, triangles, location):

@@ -70,6 +70,20 @@ def test_a_pin_alone_takes_its_surroundings():
     assert np.abs(moved[rest[:, 0] > 0.95][:, 2] - 0.1).max() < 0.05
 
 
+@pytest.mark.parametrize("part", ["contact", "secondary"])
+def test_without_locality_what_is_far_from_all_pins_holds(part):
+    """Also where it was switched on after a drag."""
+    bar = scenes.bar()
+    rest = scenes.world_points(bar)
+    empty = pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.35))
+    getattr(bar.arapfields, part).use = True
+    drag.of_entry(bpy.context, bar, bar.arapfields.handles[0]).end(bpy.context)
+    step()
+    empty.location.z += 0.9
+    step(refined=True)
+    assert np.abs(scenes.world_points(bar) - rest)[rest[:, 0] < -0.8].max() < 0.15
+
+
 def test_locality_at_its_strongest_keeps_the_rest():
     """Where the default takes the whole along."""
     ways = []
