@@ -6,7 +6,7 @@ import time
 import bpy
 import numpy as np
 import stage
-from mouse import until, until_idle
+from stage import until, until_idle
 from support.blender import scenes
 
 from addon.core.runtime import jobs

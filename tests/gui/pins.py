@@ -8,7 +8,7 @@ bit: names of all data-blocks, positions, transforms, the handles and the shape.
 import bpy
 import numpy as np
 import stage
-from mouse import drag, hover, is_dragging, is_followed, pixel, release, until
+from stage import drag, hover, is_dragging, is_followed, pixel, release, until
 from support.blender import scenes
 
 from addon.live import sessions

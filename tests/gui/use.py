@@ -6,7 +6,7 @@ import jobs as window_jobs
 import numpy as np
 import stage
 from mathutils import Vector
-from mouse import pixel, until_idle, until_live_rests
+from stage import pixel, until_idle, until_live_rests
 from support.blender import scenes
 
 from addon.core.runtime import jobs

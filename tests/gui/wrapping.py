@@ -8,7 +8,7 @@ import numpy as np
 import panel
 import stage
 from mathutils import Vector
-from mouse import click, keys, pixel, until_idle
+from stage import click, keys, pixel, until_idle
 from support.blender import character, scenes, wraps
 
 from addon.blender import modifier_stack
