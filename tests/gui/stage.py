@@ -32,10 +32,8 @@ def pixel(point):
 
 
 def click(spot, button=1, pause=0.6):
-    tool("mousemove", spot[0] - 3, spot[1])
-    yield 0.3
-    tool("mousemove", *spot)
-    yield 0.3
+    yield from move(spot[0] - 3, spot[1])
+    yield from move(*spot)
     tool("click", button)
     yield pause
 
@@ -46,11 +44,14 @@ def keys(*names, pause=0.4):
         yield pause
 
 
+def move(x, y, pause=0.3):
+    tool("mousemove", x, y)
+    yield pause
+
+
 def hover(spot):
-    tool("mousemove", spot[0] - 4, spot[1])
-    yield 0.2
-    tool("mousemove", *spot)
-    yield 0.3
+    yield from move(spot[0] - 4, spot[1], pause=0.2)
+    yield from move(*spot)
 
 
 def until(reached, limit=20.0, sign=lambda: None):
