@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One source that is live: its requests, the worker that solves them, and where the shape is shown."""
 
-import contextlib
 import itertools
 import time
 from collections import deque
@@ -274,11 +273,6 @@ class Session:
         if self.has_motion:
             self.playback.wait(self.requested, PATIENCE)
         self.show()
-
-    def show_last(self):
-        """Shows the last shape of a worker that has ended; its errors are ignored."""
-        with contextlib.suppress(UserError, ReferenceError):
-            self.show()
 
     def take_away(self, source):
         """Restores the state from before live mode; `source` is None if it was deleted."""
