@@ -141,8 +141,7 @@ def test_a_live_object_of_its_own_comes_back_by_undo():
 
 
 def test_a_live_object_behind_its_extracted_surface_stays_hidden_under_undo():
-    """The surface, once it is carried along, is shown by what the step says: live mode, which begins anew with
-    each change of what is carried, hides and shows nothing."""
+    """Live mode begins anew with each change of what is carried, and hides and shows nothing then."""
     end = world.few_centers()
     try:
         build()
