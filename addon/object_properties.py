@@ -1,79 +1,40 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the three solves, made from the tables of core/settings."""
+"""object.arapfields: the settings, handles and results of one object."""
 
 import bpy
 
 from .animation.properties import ARAPFIELDS_PG_bake
 from .blender.object_references import owner_of, settings_of
-from .blender.property_definitions import (
-    choice,
-    collection,
-    flag,
-    group_annotations,
-    integer,
-    number,
-    pointer,
-    tells,
-    text,
-)
+from .blender.property_definitions import choice, collection, flag, integer, number, pointer, tells, text
 from .blender.selection import row_chosen
 from .contact.properties import ARAPFIELDS_PG_contact
-from .core.settings.choices import NORMALS, STYLIZE
-from .core.settings.parameters import DEFORM, FIT, QUALITIES
+from .core.settings.choices import CARRYING, NORMALS
 from .handles.properties import ARAPFIELDS_PG_handle
 from .live.properties import ARAPFIELDS_PG_secondary
 from .names import BONE_NUMBER, PROPERTY
 from .pin_tool.properties import ARAPFIELDS_PG_scene
-from .properties.choices import (
-    RESULT_ITEMS,
-    ARAPFIELDS_PG_carried,
-    extraction,
-    orientation,
-    output,
-    quality,
-    result,
-    style,
-    surface,
-)
+from .properties.choices import RESULT_ITEMS, extraction, output, result, surface
+from .properties.solve_settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
 from .skin.properties import ARAPFIELDS_PG_skin
 from .stiffness.properties import ARAPFIELDS_PG_stiffness
 from .wrap.properties import ARAPFIELDS_PG_wrap
 
-
-def apply_quality(group, context):
-    for name, value in QUALITIES[group.quality][2].items():
-        setattr(group, name, value)
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # library overrides keep it, so that they can be carried
 
 
-def group(name, parameters, **further):
-    annotated = {**further, **group_annotations(parameters)}
-    return type(name, (bpy.types.PropertyGroup,), {"__annotations__": annotated})
-
-
-ARAPFIELDS_PG_fit = group("ARAPFIELDS_PG_fit", FIT, quality=quality(update=apply_quality))
-ARAPFIELDS_PG_deform = group("ARAPFIELDS_PG_deform", DEFORM)
-ARAPFIELDS_PG_stylize = group(
-    "ARAPFIELDS_PG_stylize",
-    STYLIZE,
-    style=style(),
-    frame=orientation(),
-    frame_object=pointer(bpy.types.Object, "Axes Of", "Object along whose axes the style stands"),
-    region=text("Region", "Vertex group whose weights say how strongly the style acts; empty for everywhere"),
-    style_object=pointer(
-        bpy.types.Object,
-        "Normals Of",
-        "Object whose axes or shape the surface turns towards, for styles of that kind",
-    ),
-    region_material=pointer(
-        bpy.types.Material, "Material", "Material on whose faces the style acts; empty for everywhere"
-    ),
-    use_handles=flag("Follow Handles", "Handles hold and move their parts while the rest is stylized"),
+BASE_KINDS = (
+    ("NONE", "None", "The field moves the object's points, or nothing yet"),
+    ("TRANSFORM", "Delta Transforms", "The field moves the object as a whole"),
+    ("BONES", "Bones", "The field poses the armature's bones"),
 )
 
 
-# object.arapfields: the settings, handles and results of one object.
-
-OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # library overrides keep it, so that they can be carried
+class ARAPFIELDS_PG_carried(bpy.types.PropertyGroup):
+    # `name`, which every PropertyGroup has, keeps the object's name for messages after its deletion
+    item: pointer(bpy.types.Object, "Object", "Moved by the field of the object that carries it")
+    way: choice(CARRYING, "Way", "How the object is carried")
+    base: text("Own Pose", "The object's own delta transforms or pose while the field moves it, as JSON")
+    base_kind: choice(BASE_KINDS, "Kind of Own Pose", "What the object's own pose consists of")
 
 
 class ARAPFIELDS_PG_result(bpy.types.PropertyGroup):
@@ -194,10 +155,4 @@ def detach():
         delattr(bpy.types.Bone, BONE_NUMBER)
 
 
-CLASSES = [
-    ARAPFIELDS_PG_fit,
-    ARAPFIELDS_PG_deform,
-    ARAPFIELDS_PG_stylize,
-    ARAPFIELDS_PG_result,
-    ARAPFIELDS_PG_object,
-]
+CLASSES = [ARAPFIELDS_PG_carried, ARAPFIELDS_PG_result, ARAPFIELDS_PG_object]

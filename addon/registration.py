@@ -11,7 +11,7 @@ from .blender import host, source_operator
 
 CONTENTS = [  # modules with CLASSES
     # what is stored in the .blend: object.arapfields
-    *("handles.properties", "properties.choices", "pin_tool.properties", "live.properties"),
+    *("handles.properties", "properties.solve_settings", "pin_tool.properties", "live.properties"),
     *("stiffness.properties", "animation.properties", "wrap.properties", "skin.properties"),
     "contact.properties",
     "object_properties",
@@ -22,9 +22,9 @@ CONTENTS = [  # modules with CLASSES
     *("stylize.operators", "stylize.panel"),
     *("wrap.operators", "wrap.landmark_tools", "wrap.refitting", "wrap.sheet", "wrap.panel"),
     *("skin.operators", "carried.operators", "poses.operators", "stiffness.operators"),
-    "contact.operators",
+    *("contact.operators", "contact.panel"),
     *("live.operators", "live.panel", "pin_tool.operators"),
-    *("animation.operators", "animation.exporters", "animation.splat_export"),
+    *("animation.operators", "animation.exporters", "animation.splat_export", "animation.panel"),
     *("results.operators", "results.panel", "jobs.operators", "jobs.panel"),
     *("menus", "preferences"),
 ]

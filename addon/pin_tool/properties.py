@@ -3,9 +3,12 @@
 
 import bpy
 
-from ..blender.property_definitions import choice, collection, flag, integer
+from ..blender.property_definitions import choice, collection, flag, integer, text
 from ..core.settings.choices import TASKS
-from ..properties.choices import ARAPFIELDS_PG_pose
+
+
+class ARAPFIELDS_PG_pose(bpy.types.PropertyGroup):
+    data: text("Field", "The field, with samples of the shape that it was solved on")
 
 
 class ARAPFIELDS_PG_scene(bpy.types.PropertyGroup):
@@ -26,4 +29,4 @@ class ARAPFIELDS_PG_scene(bpy.types.PropertyGroup):
     )
 
 
-CLASSES = [ARAPFIELDS_PG_scene]
+CLASSES = [ARAPFIELDS_PG_pose, ARAPFIELDS_PG_scene]
