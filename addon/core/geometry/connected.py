@@ -22,6 +22,8 @@ def connected(points, vertices, triangles):
     if not len(corners):
         return np.ones(len(points), dtype=bool)
     part = parts_of(corners)
+    if not part.any():
+        return np.ones(len(points), dtype=bool)
     first = away.argmin()
     place = closest_points(center, corners[first : first + 1])[0, 0]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
