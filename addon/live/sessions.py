@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The window's scene and its frame. Each scene has a depsgraph of its own, and Blender copies evaluated
-transforms to the original objects only from the active one: after a switch they are still those of the scene
-before, and after a jump to a frame, until the window evaluates it, those of the frame before."""
+"""Live mode: shapes follow handles and a style's sliders; its end restores the earlier state.
+
+A tool or script makes an object live with begin(context, source), has it show the newest shape with
+update(context) (in a window a timer does), and ends it with end(context, source, keep).
+"""
 
 import contextlib
 
@@ -25,7 +27,13 @@ from .stored import Kept
 
 
 class ShownScene:
-    """`uid`: session_uid of the scene at the last check; None before the first one."""
+    """The window's scene and its frame.
+
+    Each scene has a depsgraph of its own, and Blender copies evaluated transforms to the original objects
+    only from the active one: after a switch they are still those of the scene before, and after a jump to a
+    frame, until the window evaluates it, those of the frame before. `uid`: session_uid of the scene at the
+    last check; None before the first one.
+    """
 
     uid = None
 
@@ -44,11 +52,6 @@ class ShownScene:
             session.edits.may_have_moved = session.reader.moves_by_itself
         updated(context.view_layer)
 
-
-# Live mode: shapes follow handles and a style's sliders; its end restores the earlier state.
-#
-# A tool or script makes an object live with begin(context, source), has it show the newest shape with
-# update(context) (in a window a timer does), and ends it with end(context, source, keep).
 
 INTERVAL = 1 / 60  # seconds between calls of the timer
 WAIT = 30.0  # seconds at most that a script waits for the first shape

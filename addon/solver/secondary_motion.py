@@ -10,8 +10,6 @@ from ..blender.object_references import settings_of
 from ..blender.property_definitions import from_single_precision
 from ..core.geometry.spaces import inverse, pose
 
-# Secondary motion by a source's settings.
-
 
 class SecondaryMotion(NamedTuple):
     """Native options of the motion, and the source's placement in the world; in solve space."""

@@ -78,8 +78,6 @@ class RedrawThrottle:
         self._begun, self._busy = now, 0.0
 
 
-# Jobs: long work on a worker thread, with progress, cancellation, and an outcome per item.
-
 # Progress of an item that makes several native calls.
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Walks as data: scenes and steps by names and seeds; drawn, written, shortened."""
+"""Walks as data, drawn, written and shortened; and how they are taken in a process of Blender's."""
 
 import json
 import os
