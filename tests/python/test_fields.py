@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fields as Python sees them: derivatives, arrays, files, solves over radial ones, and inverses."""
 
-import threading
-import time
-
 import numpy as np
 import pytest
 from support import tolerances
 from support.geometry import cases, meshes
 from support.geometry.meshes import LEFT, RIGHT, bar_samples, turned
 from support.oracles.network import Network
+from support.tasks import cancelled_when
 
 import arapfields as af
 
@@ -424,19 +422,9 @@ def test_extraction_stops_and_names_bad_input(bunny):
         af.extract_deformed(sdf, field, 5)
     with pytest.raises(af.InvalidInput, match="threads"):
         af.extract_deformed(sdf, field, 32, threads=-1)
-    task, seen = af.Task(), []
-
-    def watch():
-        while task.progress < 0.2:
-            seen.append(task.progress)
-            time.sleep(0.01)
-        task.cancel()
-
-    watcher = threading.Thread(target=watch)
-    watcher.start()
-    with pytest.raises(af.Cancelled):
+    task = af.Task()
+    with cancelled_when(task, lambda seen: task.progress >= 0.2) as seen, pytest.raises(af.Cancelled):
         af.extract_deformed(sdf, field, 96, task=task)
-    watcher.join()
     assert seen == sorted(seen)
 
 

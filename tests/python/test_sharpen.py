@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The finish of a style on a mesh's own vertices: identities, folds, what stays, and what is refused."""
 
-import threading
-import time
-
 import numpy as np
 import pytest
 from support.geometry.meshes import box, sphere, subdivide, suzanne, torus
+from support.tasks import cancelled_when
 
 import arapfields as af
 
@@ -247,20 +245,10 @@ def test_threads_change_nothing():
 
 def test_it_hears_cancel_and_its_progress_rises():
     vertices, triangles = sphere(1.0, 7)
-    task, seen = af.Task(), []
+    task = af.Task()
     options = af.SharpenOptions(iterations=100_000)
-
-    def watch():
-        while len(seen) < 30:
-            seen.append(task.progress)
-            time.sleep(0.01)
-        task.cancel()
-
-    watcher = threading.Thread(target=watch)
-    watcher.start()
-    with pytest.raises(af.Cancelled):
+    with cancelled_when(task, lambda seen: len(seen) == 30) as seen, pytest.raises(af.Cancelled):
         af.sharpen(vertices, triangles, vertices, "cube", options, task=task)
-    watcher.join()
     assert seen == sorted(seen) and task.progress < 1.0
 
 
