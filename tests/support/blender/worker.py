@@ -53,8 +53,10 @@ def main():
     bpy.ops.wm.read_factory_settings(use_empty=True)
     for line in sys.stdin:
         print(json.dumps(run(json.loads(line))), file=answers, flush=True)
-    if os.name == "nt":  # under Wine the threads of Blender's libraries may deadlock at exit
+    # At the end of the process threads of Blender's may deadlock, under Wine also in _exit.
+    if os.name == "nt":
         ctypes.windll.kernel32.TerminateProcess(ctypes.c_void_p(-1), 0)
+    os._exit(0)
 
 
 if __name__ == "__main__":
