@@ -48,8 +48,9 @@ constexpr double bend_ratio = 1.3, gap_ratio = 2.0;
 constexpr double company_widths = 2.2, blend_widths = 0.8;
 /// Longest interior distance that is looked for, in widths: nodes beyond it have no weight.
 constexpr double longest_widths = 6.0;
-/// Rounds over a mesh's edges in which their ends come to lie on sides that see each other.
-constexpr int most_rounds = 4;
+/// Rounds over a mesh's vertices in which the ends of edges come to lie on sides that see each other: two or
+/// three are enough.
+constexpr int most_rounds = 8;
 /// Depth of eyes below the surface, in widths.
 constexpr double eye_widths = 0.15;
 /// Nodes that are tried, in the order of distance, before a point takes the nearest one with a like normal.
@@ -481,6 +482,7 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(PointsIn points, PointsIn n
 
 std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& mesh, const Frame& frame) const {
   if (!sight) return std::vector<SurfaceSide>(static_cast<std::size_t>(mesh.vertices.rows()), -1);
+  if (const std::vector<SurfaceSide>* const known = sight->kept(mesh)) return *known;
   const TriangleMesh outward = facing_outwards(mesh);
   if (const std::vector<SurfaceSide>* const known = sight->kept(outward)) return *known;
   return sides_of(outward, frame, InsideSight(outward, frame));
@@ -495,26 +497,37 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& outward
   if (doubtful != nullptr) *doubtful = near;
   std::vector<bool> is_near(result.size(), false);
   for (const Index v : near) is_near[static_cast<std::size_t>(v)] = true;
-  const auto distance = [&](std::int32_t v, SurfaceSide side) {
-    return (places.row(v) - nodes.row(side)).squaredNorm();
+  std::vector<std::vector<std::int32_t>> beside(near.empty() ? 0 : result.size());
+  for (Index t = 0; !near.empty() && t < outward.triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const std::int32_t a = outward.triangles(t, k), b = outward.triangles(t, (k + 1) % 3);
+      if (!is_near[a] || !is_near[b] || (places.row(a) - places.row(b)).squaredNorm() > width * width)
+        continue;
+      beside[a].push_back(b);
+      beside[b].push_back(a);
+    }
+  const auto torn = [&](Index v, SurfaceSide side) {
+    return std::count_if(beside[v].begin(), beside[v].end(), [&](std::int32_t other) {
+      return result[other] != side && sight->hides(result[other], side);
+    });
   };
-  // Each change takes a vertex to a side of a neighbour that is nearer than its own was to the other: few are
-  // left after a few rounds.
-  bool changed = !near.empty();
+  // A vertex takes a neighbour's side where fewer of its edges are then torn. At the end of a slit some are
+  // for good; the line between the sides stays there.
+  bool changed = true;
   for (int round = 0; changed && round < most_rounds; ++round) {
     changed = false;
-    for (Index t = 0; t < outward.triangles.rows(); ++t)
-      for (int k = 0; k < 3; ++k) {
-        const std::int32_t a = outward.triangles(t, k), b = outward.triangles(t, (k + 1) % 3);
-        if (!is_near[a] || !is_near[b] || result[a] == result[b] || !sight->hides(result[a], result[b]) ||
-            (places.row(a) - places.row(b)).squaredNorm() > width * width)
-          continue;
-        if (distance(b, result[a]) < distance(a, result[b]))
-          result[b] = result[a];
-        else
-          result[a] = result[b];
-        changed = true;
+    for (const Index v : near) {
+      auto least = torn(v, result[v]);
+      for (const std::int32_t other : beside[v]) {
+        if (least == 0) break;
+        const SurfaceSide side = result[other];
+        if (const auto left = torn(v, side); left < least) {
+          least = left;
+          result[v] = side;
+          changed = true;
+        }
       }
+    }
   }
   return result;
 }

@@ -54,8 +54,8 @@ ObjectiveTerms terms_of(const SurfaceSamples& samples, const std::vector<Handle>
   require_within_reach(terms.handles, samples.points);
   terms.pull = options.handles;
   terms.locality.options = options.locality;
-  terms.locality.motion = shared_motion(terms.handles, samples.size());
   if (terms.locality.acts()) {
+    terms.locality.motion = shared_motion(terms.handles, samples.size());
     std::vector<Index> rows(static_cast<std::size_t>(samples.size()));
     std::iota(rows.begin(), rows.end(), Index{0});
     const std::vector<Index> parts = parts_of(samples.points);

@@ -96,11 +96,13 @@ FieldMeasures measure_at(const DeformationField& field, PointsIn points) {
 }
 
 Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples& samples,
-                  const ObjectiveTerms& terms, LoopResult loop, std::optional<MeshMeasures> of_mesh) {
+                  const ObjectiveTerms& terms, LoopResult loop, Measures known) {
   Solution solution{std::move(field), {}};
-  solution.report = measure(*solution.field, samples, terms);
+  solution.report =
+      known.at_samples ? *std::move(known.at_samples) : measure(*solution.field, samples, terms);
   const std::optional<FarTarget> far = far_target(terms.handles, samples.points);
   if (far) solution.report.far_target = far->sizes;
+  std::optional<MeshMeasures> of_mesh = std::move(known.of_mesh);
   if (!of_mesh && samples.mesh) of_mesh = measure_triangles(*solution.field, *samples.mesh);
   if (of_mesh) {
     merge(solution.report.distortion, of_mesh->distortion);

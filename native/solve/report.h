@@ -16,10 +16,15 @@ namespace arapfields {
 SolveReport measure(const DeformationField& field, const SurfaceSamples& samples, const ObjectiveTerms& terms,
                     Index max_samples = 4000);
 
-/// A field that another solver made, with its report and warnings. `of_mesh`: measure_triangles() of the
-/// samples' mesh, where they are known.
+/// What is known of a field: measure() of it, and measure_triangles() of the samples' mesh.
+struct Measures {
+  std::optional<SolveReport> at_samples;
+  std::optional<MeshMeasures> of_mesh;
+};
+
+/// A field that another solver made, with its report and warnings. What is not known of it is measured.
 Solution measured(std::shared_ptr<DeformationField> field, const SurfaceSamples& samples,
-                  const ObjectiveTerms& terms, LoopResult loop, std::optional<MeshMeasures> of_mesh = {});
+                  const ObjectiveTerms& terms, LoopResult loop, Measures known = {});
 
 /// Makes the objective to minimise out of solve_field's own, for terms that it does not know.
 using WrapObjective = std::function<std::unique_ptr<Objective>(Objective& inner)>;

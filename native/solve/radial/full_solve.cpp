@@ -76,8 +76,8 @@ struct FullSolve {
   /// A deformation goes on also where it stretches the mesh more than the first, and than the energy samples
   /// by the second factor: these are not seen there.
   static constexpr double most_stretch = 3.0, beyond_samples = 1.5;
-  /// A solve anew is not kept if the samples' energy is so many times that of before: at places where parts
-  /// touch and come apart, what the field stretches is no surface.
+  /// A round is not kept if the samples' energy is so many times that of before: at places where parts touch
+  /// and come apart, what the field stretches is no surface.
   static constexpr double dearer = 3.0;
 };
 
@@ -225,59 +225,76 @@ struct Unfolding {
   bool all_samples = false;  ///< look at all samples; else only where the mesh or the energy samples fold
   bool of_mesh = false;  ///< folds and stretches of the mesh's own triangles count; a style's are mended by
                          ///< its finish
-  /// Solves anew in `rounds_anew`, without a barrier, and returns whether that is to be kept; empty: goes on
-  /// from the present shape. Where nothing held the field it may be so far off that descent from there is
-  /// slow, and behind the barrier stuck.
-  std::function<bool()> anew = {};
+  /// Solves anew in `rounds_anew`, without a barrier; empty: goes on from the present shape. Where nothing
+  /// held the field it may be so far off that descent from there is slow, and behind the barrier stuck.
+  std::function<void()> anew = {};
 };
 
-/// Whether a field folds fewer triangles of the samples' mesh than another, or stretches as many less.
-bool is_better(const DeformationField& before, const DeformationField& now, const SurfaceSamples& samples) {
-  if (!samples.mesh) return true;
-  const MeshMeasures was = measure_triangles(before, *samples.mesh);
-  const MeshMeasures is = measure_triangles(now, *samples.mesh);
-  return is.folded < was.folded ||
-         (is.folded == was.folded &&
-          is.distortion.max_stretch < was.distortion.max_stretch / FullSolve::beyond_samples);
+/// A field of a solve, and what was measured of it.
+struct Candidate {
+  std::shared_ptr<DeformationField> field;
+  RadialReport solved;
+  Measures measures;
+};
+
+/// Whether a field folds fewer triangles than another, then fewer samples, or as many and stretches them
+/// less, and is not much dearer.
+bool is_better(const Measures& now, const Measures& before) {
+  const auto folds = [](const Measures& of) {
+    return std::pair(of.of_mesh ? of.of_mesh->folded : 0, of.at_samples->distortion.flipped_share);
+  };
+  const auto stretch = [](const Measures& of) {
+    return (of.of_mesh ? of.of_mesh->distortion : of.at_samples->distortion).max_stretch;
+  };
+  return now.at_samples->arap.energy <= FullSolve::dearer * before.at_samples->arap.energy &&
+         (folds(now) < folds(before) ||
+          (folds(now) == folds(before) && stretch(now) < stretch(before) / FullSolve::beyond_samples));
 }
 
-/// Solves in rounds while the field folds or stretches at samples or triangles. Returns the measures of the
-/// samples' mesh in the end.
-std::optional<MeshMeasures> unfold(RadialSolver& solver, const SurfaceSamples& samples,
-                                   const SurfaceOptions& surface, const Unfolding& how, const Shown& shown,
-                                   const Progress& progress) {
+/// Solves in rounds while the field folds or stretches at samples or triangles, or until a round is no better
+/// than the one before. Returns the best.
+Candidate unfold(RadialSolver& solver, const SurfaceSamples& samples, const SurfaceOptions& surface,
+                 const ObjectiveTerms& terms, const Unfolding& how, const Shown& shown,
+                 const Progress& progress) {
   DistortionLimits limits{surface.barrier_threshold};
   if (how.of_mesh)
     limits.most_stretch =
         std::max(FullSolve::most_stretch, FullSolve::beyond_samples * solver.report().distortion.max_stretch);
-  std::optional<MeshMeasures> seen;
-  int rounds = how.rounds;
-  for (int round = 0;; ++round) {
-    const std::shared_ptr<const DeformationField> now = shown();
-    if (samples.mesh) seen = measure_triangles(*now, *samples.mesh, limits);
-    const bool is_wrong = how.of_mesh && seen && seen->is_wrong;
-    if (round == rounds || !(how.all_samples || is_wrong || solver.report().distortion.flipped_share > 0.0))
-      break;
+  const auto present = [&] {
+    Candidate result{shown(), solver.report(), {}};
+    if (how.of_mesh) result.measures.at_samples = measure(*result.field, samples, terms);
+    if (samples.mesh) result.measures.of_mesh = measure_triangles(*result.field, *samples.mesh, limits);
+    return result;
+  };
+  Candidate best = present();
+  for (int round = 0; round < how.rounds; ++round) {
+    const std::optional<MeshMeasures>& of_mesh = best.measures.of_mesh;
+    const bool is_wrong = how.of_mesh && of_mesh && of_mesh->is_wrong;
+    if (!(how.all_samples || is_wrong || best.solved.distortion.flipped_share > 0.0)) break;
     const bool is_anew = round < FullSolve::rounds_anew && how.anew;
-    const MeshPlaces places = is_wrong ? seen->wrong : MeshPlaces();
-    if (solver.add_fold_samples(is_anew ? surface.barrier : how.barrier, *now, places) == 0) break;
-    if (!is_anew)
+    const MeshPlaces places = is_wrong ? of_mesh->wrong : MeshPlaces();
+    if (solver.add_fold_samples(is_anew ? surface.barrier : how.barrier, *best.field, places) == 0) break;
+    if (is_anew)
+      how.anew();
+    else
       solver.solve(how.steps, 0.0, progress);
-    else if (!how.anew())
-      rounds = round + 1;
+    Candidate next = present();
+    if (how.of_mesh && !is_better(next.measures, best.measures)) break;
+    best = std::move(next);
   }
-  return seen;
+  return best;
 }
 
-Solution finish(const Shown& shown, const SurfaceSamples& samples, const ObjectiveTerms& terms,
-                LoopResult loop, std::optional<MeshMeasures> of_mesh, const RadialReport& solved,
+Solution finish(Candidate solved, const SurfaceSamples& samples, const ObjectiveTerms& terms, LoopResult loop,
                 const Progress& progress) {
   progress.report(0.98, "measuring the result");
-  Solution solution = measured(shown(), samples, terms, std::move(loop), std::move(of_mesh));
-  solution.report.contact = solved.contact;
-  solution.report.terms = solved.terms;
+  Solution solution =
+      measured(std::move(solved.field), samples, terms, std::move(loop), std::move(solved.measures));
+  solution.report.contact = solved.solved.contact;
+  solution.report.terms = solved.solved.terms;
   for (LossTerm& term : solution.report.terms) term.value *= terms.rigidity;
-  for (std::string& note : notes_on(solved.contact)) solution.report.warnings.push_back(std::move(note));
+  for (std::string& note : notes_on(solved.solved.contact))
+    solution.report.warnings.push_back(std::move(note));
   return solution;
 }
 
@@ -325,8 +342,7 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   RadialSolver solver(samples, handles, fine, progress.part(done, 0.4), shape, blend);
   solver.set_contact(hooks.contact, true, progress);
   if (first) solver.adopt(*first, contact_first);
-  std::shared_ptr<DeformationField> kept;  // of before a solve that was not worth it
-  const Shown shown = [&] { return kept ? kept : around(solver.field()); };
+  const Shown shown = [&] { return around(solver.field()); };
   LoopResult loop = run(solver, options.training, progress.part(0.4, 0.95), hooks, 1.0, shown,
                         {.least_gain = FullSolve::least_gain});
   const ObjectiveTerms terms = measured_terms(samples, handles, *shape, options.surface);
@@ -337,11 +353,7 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
   how.rounds = was_ended(loop) || hooks.contact ? 0 : FullSolve::unfolding_rounds;
   how.steps = std::min(FullSolve::unfolding_iterations, options.training.iterations);
   how.of_mesh = true;
-  RadialReport solved;  // of `kept`
   how.anew = [&] {
-    solved = solver.report();
-    const std::shared_ptr<DeformationField> before = shown();
-    const double energy = measure(*before, samples, terms).arap.energy;
     solver.reset();
     solver.set_targets(handles);
     if (first) solver.adopt(*first);
@@ -351,16 +363,9 @@ Solution deform_radial(const SurfaceSamples& given, const std::vector<Handle>& h
       loop.history.emplace_back(loop.iterations + iterations, value);
     loop.iterations += again.iterations;
     loop.seconds += again.seconds;
-    if (is_better(*before, *shown(), samples) &&
-        measure(*shown(), samples, terms).arap.energy <= FullSolve::dearer * energy)
-      return true;
-    kept = before;
-    return false;
   };
-  std::optional<MeshMeasures> of_mesh =
-      unfold(solver, samples, options.surface, how, shown, progress.part(0.97, 0.98));
-  return finish(shown, samples, terms, std::move(loop), std::move(of_mesh), kept ? solved : solver.report(),
-                progress);
+  Candidate best = unfold(solver, samples, options.surface, terms, how, shown, progress.part(0.97, 0.98));
+  return finish(std::move(best), samples, terms, std::move(loop), progress);
 }
 
 DeformOptions followed_closely(DeformOptions options) {
@@ -424,12 +429,11 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   how.rounds = options.surface.barrier > 0.0 && !was_ended(loop) ? FullSolve::unfolding_rounds : 0;
   how.steps = std::min(FullSolve::unfolding_iterations, options.training.iterations);
   how.all_samples = true;
-  std::optional<MeshMeasures> of_mesh =
-      unfold(solver, samples, options.surface, how, shown, progress.part(0.95, 0.98));
   ObjectiveTerms terms = measured_terms(samples, handles, *shape, options.surface);
   terms.rigidity = options.rigidity;
   terms.style = StyleAtSamples::of(style, samples.normals, options.sharpness);
-  return finish(shown, samples, terms, loop, std::move(of_mesh), solver.report(), progress);
+  Candidate best = unfold(solver, samples, options.surface, terms, how, shown, progress.part(0.95, 0.98));
+  return finish(std::move(best), samples, terms, loop, progress);
 }
 
 }  // namespace arapfields
