@@ -9,6 +9,8 @@ import numpy as np
 from ..blender import vertex_groups
 from ..blender.property_definitions import options_of
 from ..core.runtime import native
+from ..core.settings.choices import STYLIZE
+from ..core.settings.parameters import is_fast
 from ..handles.native_handles import held_points, native_handles
 from .contact import ContactTerm, native_contact
 
@@ -24,6 +26,7 @@ class Stylization:
     handles: list  # core.geometry.handles.Handle; what they hold stays where the field has it
     region: np.ndarray | None  # (n,) weights of the source's vertices, with which the style acts
     contact: ContactTerm | None
+    alone: bool  # whether the style alone moves the surface: strength is then the share of the whole way
 
     def field(self, surface, samples, task, distances=None):
         """The field. `distances`: {key of a Solid: MeshSdf} that is known, and added to."""
@@ -52,7 +55,7 @@ class Stylization:
             weights = np.where(held, 0.0, 1.0 if weights is None else weights)
         up = None if self.handles else self.up
         contact = native_contact(self.contact, distances)
-        further = {"weights": weights, "up": up, "contact": contact, "task": task}
+        further = {"weights": weights, "up": up, "contact": contact, "alone": self.alone, "task": task}
         return native.library().sharpen(points, triangles, moved, self.directions, self.finish, **further)
 
 
@@ -66,7 +69,9 @@ def stylization(values, directions, up, handles, region, contact, machine=None):
         iterations = min(values.get("iterations", math.inf), af.ITERATIONS_BEFORE_SHARPEN)
         values = values | {"centers": af.CENTERS_BEFORE_SHARPEN, "iterations": iterations}
     options = options_of("stylize", values, machine)
-    return Stylization(directions, up, options, finish, handles, region, contact)
+    is_radial = "field" not in values or is_fast(values, STYLIZE)  # live mode knows no other
+    alone = is_radial and not handles
+    return Stylization(directions, up, options, finish, handles, region, contact, alone)
 
 
 def at_points(surface, weights, points):

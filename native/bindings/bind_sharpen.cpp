@@ -16,7 +16,7 @@ void bind_sharpen(py::module_& module) {
       [](const ArrayArgument& vertices, const ArrayArgument& triangles, const ArrayArgument& moved,
          const NormalsArgument& normals, SharpenOptions options, const std::optional<ArrayArgument>& weights,
          const std::optional<ArrayArgument>& orientation, const std::optional<ArrayArgument>& up,
-         const std::optional<Contact>& contact, Task* task) {
+         const std::optional<Contact>& contact, bool alone, Task* task) {
         const TriangleMesh mesh = as_mesh(vertices, triangles);
         const Points after = as_points(moved, "moved");
         const Style style = turned_style(normals, orientation);
@@ -24,12 +24,13 @@ void bind_sharpen(py::module_& module) {
         const Vector shares = as_vector(weights, "weights");
         return run_long(task, [&](const Progress& progress) {
           return sharpen(mesh.vertices, mesh.triangles, after, style, options, progress, shares, upwards,
-                         contact.value_or(Contact()));
+                         contact.value_or(Contact()), alone);
         });
       },
       "vertices"_a, "triangles"_a, "moved"_a, "normals"_a,
       py::arg_v("options", SharpenOptions(), "SharpenOptions()"), py::kw_only(), "weights"_a = py::none(),
-      "orientation"_a = py::none(), "up"_a = py::none(), "contact"_a = py::none(), "task"_a = py::none(),
+      "orientation"_a = py::none(), "up"_a = py::none(), "contact"_a = py::none(), "alone"_a = true,
+      "task"_a = py::none(),
       R"(
 A mesh's vertices (n, 3), stylized by a field, brought nearer to the style by the mesh's own triangles.
 
@@ -39,8 +40,11 @@ triangles, as far as they face a preferred normal within 60°, face it more clos
 are 0, vertices stay. With `up` (3,) and no such vertex, the lowest along it keeps its height. In `contact`
 vertices enter no obstacle and do not pass the ground; those that `moved` has inside go no further; contact
 of the surface with itself is refused. Vertices at one place stay together, loose ones stay where they are,
-and no triangle is folded that is not folded in `moved` (folded_triangles). Raises InvalidInput and
-Cancelled.)");
+and no triangle is folded that is not folded in `moved` (folded_triangles).
+
+A strength below 1 is that of the field as well: the result lies that share of the way from rest to the
+style's whole shape. Where not the style `alone` has moved the vertices but handles too, or a network, it
+scales the style's weight as in stylize; so it does in contact. Raises InvalidInput and Cancelled.)");
   module.def(
       "folded_triangles",
       [](const ArrayArgument& vertices, const ArrayArgument& triangles, const ArrayArgument& moved) {

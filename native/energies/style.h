@@ -28,7 +28,7 @@ struct StyleAtSamples {
   double factor = 1.0;                        ///< of the style's weight
 
   /// The weight of the style at this strength, relative to its whole one: so that half of the strength moves
-  /// a surface by half of the way, for which a ninth of the weight is enough. Above 1, the strength itself.
+  /// a surface by about half of the way, where more than the style moves it. Above 1, the strength itself.
   double share(double strength) const;
 
   /// At samples with these rest normals (n,3). An object's map is smoothed less the larger the sharpness is;

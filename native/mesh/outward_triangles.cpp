@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/parallel.h"
 #include "mesh/is_closed.h"
 
 namespace arapfields {
@@ -22,6 +23,17 @@ constexpr double long_boundary = 8.0;
 constexpr double flat = 1e-9;
 /// Vertices of a patch that tell whether it lies inside another one.
 constexpr std::size_t most_witnesses = 16;
+/// Loops run on one thread, in chunks between which a CancelScope is heard.
+constexpr Index rows_at_once = 16384;
+
+/// body(i) for all i below `count`, in order.
+template <class Body>
+void each_in_order(Index count, const Body& body) {
+  const ThreadScope in_order(1);
+  parallel_for(0, count, rows_at_once, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) body(i);
+  });
+}
 
 /// Connected triangles, each with whether it faces the other way than the first one, by union-find.
 class Patches {
@@ -138,11 +150,12 @@ Triangles outward_triangles(const TriangleMesh& mesh, Vector* sheet_sizes) {
   };
   std::vector<std::uint32_t> begin(first.size() + 1, 0);
   const auto each_edge = [&](auto&& visit) {
-    for (Index t = 0; t < count; ++t)
+    each_in_order(count, [&](Index t) {
       for (int k = 0; k < 3; ++k) {
         const std::int32_t a = first[mesh.triangles(t, k)], b = first[mesh.triangles(t, (k + 1) % 3)];
         if (a != b) visit(std::min(a, b), Passage{std::max(a, b), static_cast<std::int32_t>(t), a < b});
       }
+    });
   };
   each_edge([&](std::size_t low, Passage) { ++begin[low + 1]; });
   for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
@@ -152,7 +165,7 @@ Triangles outward_triangles(const TriangleMesh& mesh, Vector* sheet_sizes) {
 
   Patches joined(count);
   std::vector<std::pair<std::int32_t, std::pair<std::int32_t, std::int32_t>>> boundary;  // triangle, edge
-  for (std::size_t low = 0; low + 1 < begin.size(); ++low) {
+  each_in_order(mesh.vertices.rows(), [&](Index low) {
     const auto from = passages.begin() + begin[low], to = passages.begin() + begin[low + 1];
     std::stable_sort(from, to, [](const Passage& a, const Passage& b) { return a.high < b.high; });
     for (auto p = from; p != to;) {
@@ -164,14 +177,15 @@ Triangles outward_triangles(const TriangleMesh& mesh, Vector* sheet_sizes) {
           boundary.push_back({q->triangle, {static_cast<std::int32_t>(low), q->high}});
       p = end;
     }
-  }
+  });
 
   std::vector<Patch> patches;
   std::vector<std::int32_t> number(static_cast<std::size_t>(count), -1);  // of a representative's patch
   std::vector<std::int32_t> patch_of(static_cast<std::size_t>(count));
   std::vector<bool> turned(static_cast<std::size_t>(count));
   const auto corner = [&](Index t, int k) { return Vec3(mesh.vertices.row(mesh.triangles(t, k))); };
-  for (std::int32_t t = 0; t < count; ++t) {
+  each_in_order(count, [&](Index row) {
+    const auto t = static_cast<std::int32_t>(row);
     const auto [root, against] = joined.find(t);
     if (number[root] < 0) {
       number[root] = static_cast<std::int32_t>(patches.size());
@@ -185,7 +199,7 @@ Triangles outward_triangles(const TriangleMesh& mesh, Vector* sheet_sizes) {
     patch.area += area;
     if (against) patch.turned_area += area;
     for (int k = 0; k < 3; ++k) patch.box.extend(corner(t, k));
-  }
+  });
   for (const auto& [triangle, edge] : boundary) {
     Patch& patch = patches[static_cast<std::size_t>(patch_of[triangle])];
     const Vec3 a = mesh.vertices.row(edge.first), b = mesh.vertices.row(edge.second);

@@ -26,6 +26,9 @@ constexpr double no_pull = 0.5, full_pull = 0.7;
 /// to that at the preferred normal itself: triangles between two become the edge of neither. Normals within
 /// 15° of each other belong to one curved face.
 constexpr double clear_lead = 0.15, one_face = 0.9659258262890683;
+/// Rings of triangles whose mean normal chooses between preferred ones, but for details: by their own normals
+/// alone triangles where two faces of the style meet fall to either side, and edges become serrated.
+constexpr int rings_around = 2;
 /// Share of the diagonal within which normals are averaged; cosines of a triangle's own to the average below
 /// which it is part of a detail, and from which on it is not; and the share of the style's weight for
 /// details.
@@ -71,39 +74,63 @@ struct StyleAtTriangles {
     }
   }
 
-  /// The direction that pulls at a triangle of this unit normal, and how much, from 0 to 1.
-  std::pair<Vec3, double> direction(Index triangle, const Vec3& normal) const {
+  /// The direction that pulls at a triangle of this unit normal, and how much, from 0 to 1; `around`: the
+  /// normal of the surface around it, which chooses between preferred ones.
+  std::pair<Vec3, double> direction(Index triangle, const Vec3& normal, const Vec3& around) const {
     const auto pull = [](double cosine) {
       return std::clamp((cosine - no_pull) / (full_pull - no_pull), 0.0, 1.0);
     };
     if (targets.rows() > 0) return {targets.row(triangle), pull(targets.row(triangle).dot(normal))};
     Index nearest = 0;
-    const double best = (preferred * normal).maxCoeff(&nearest);
+    const double best = (preferred * around).maxCoeff(&nearest);
     double second = -1.0;
     for (Index k = 0; k < preferred.rows(); ++k)
       if (preferred.row(k).dot(preferred.row(nearest)) < one_face)
-        second = std::max(second, preferred.row(k).dot(normal));
-    return {preferred.row(nearest), pull(best) * std::min(1.0, (best - second) / lead)};
+        second = std::max(second, preferred.row(k).dot(around));
+    const double own = preferred.row(nearest).dot(normal);
+    return {preferred.row(nearest), pull(own) * std::min(1.0, (best - second) / lead)};
   }
 };
 
-/// (m') shares of a style's weight, less where the surface at rest has details that the style's faces would
-/// flatten: where triangles face elsewhere than the surface around them does on average.
-Vector relief_shares(const WeldedSurface& surface, const Progress& progress) {
-  const Points normals = surface.normals(surface.rest());
-  Vector areas = Vector::Zero(surface.nodes());
-  Points at_nodes(surface.nodes(), 3);
+/// (k,3) unit normals at the nodes: Σ of those of the triangles around, (m',3) by area.
+Points normals_at_nodes(const WeldedSurface& surface, const Points& normals) {
+  Points result(surface.nodes(), 3);
   parallel_for(0, surface.nodes(), sharpen_grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
-      surface.around(i, [&](Index t, int) {
-        sum += normals.row(t);
-        areas[i] += normals.row(t).norm() / 6.0;
-      });
-      at_nodes.row(i) = sum;
+      surface.around(i, [&](Index t, int) { sum += normals.row(t); });
+      result.row(i) = sum.normalized();
     }
   });
-  at_nodes = unit_rows(at_nodes);
+  return result;
+}
+
+/// (m',3) unit normals of the surface around each triangle, some rings far, from those by area.
+Points normals_around(const WeldedSurface& surface, const Points& normals) {
+  Points result = normals;
+  for (int ring = 0; ring < rings_around; ++ring) {
+    const Points at_nodes = normals_at_nodes(surface, result);
+    parallel_for(0, surface.triangles(), sharpen_grain, [&](Index begin, Index end) {
+      for (Index t = begin; t < end; ++t) {
+        Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+        for (int k = 0; k < 3; ++k) sum += at_nodes.row(surface.corners()(t, k));
+        result.row(t) = (ring + 1 < rings_around ? normals.row(t).norm() : 1.0) * sum.normalized();
+      }
+    });
+  }
+  return result;
+}
+
+/// (m') 1 where triangles at rest face as the surface around them does on average, down to 0 for those of
+/// details that the style's faces would flatten.
+Vector plainness(const WeldedSurface& surface, const Progress& progress) {
+  const Points normals = surface.normals(surface.rest());
+  Vector areas = Vector::Zero(surface.nodes());
+  parallel_for(0, surface.nodes(), sharpen_grain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i)
+      surface.around(i, [&](Index t, int) { areas[i] += normals.row(t).norm() / 6.0; });
+  });
+  const Points at_nodes = normals_at_nodes(surface, normals);
   const double reach = detail_reach * diagonal_of(surface.rest());
   const Vector bound = areas / (reach * reach);
   const std::vector<char> none(surface.nodes(), 0);
@@ -111,13 +138,15 @@ Vector relief_shares(const WeldedSurface& surface, const Progress& progress) {
   Points smoothed = at_nodes;
   laplacian.solve(Points::Zero(surface.nodes(), 3), at_nodes, solve_tolerance, smoothed);
   Vector result(surface.triangles());
-  for (Index t = 0; t < surface.triangles(); ++t) {
-    Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
-    for (int k = 0; k < 3; ++k) mean += smoothed.row(surface.corners()(t, k)) / 3.0;
-    const double cosine = mean.normalized().dot(normals.row(t).normalized());
-    const double share = std::clamp((cosine - on_detail) / (off_detail - on_detail), 0.0, 1.0);
-    result[t] = detail_weight + (1.0 - detail_weight) * share * share * (3.0 - 2.0 * share);
-  }
+  parallel_for(0, surface.triangles(), sharpen_grain, [&](Index begin, Index end) {
+    for (Index t = begin; t < end; ++t) {
+      Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
+      for (int k = 0; k < 3; ++k) mean += smoothed.row(surface.corners()(t, k)) / 3.0;
+      const double cosine = mean.normalized().dot(normals.row(t).normalized());
+      const double share = std::clamp((cosine - on_detail) / (off_detail - on_detail), 0.0, 1.0);
+      result[t] = share * share * (3.0 - 2.0 * share);
+    }
+  });
   return result;
 }
 
@@ -125,17 +154,18 @@ Vector relief_shares(const WeldedSurface& surface, const Progress& progress) {
 class Finish {
  public:
   Finish(const WeldedSurface& surface, Points start, const StyleAtTriangles& style, const Vector& factors,
-         const std::vector<char>& held, const Contact& contact, const Progress& progress)
+         const Vector& plain, const std::vector<char>& held, const Contact& contact, const Progress& progress)
       : surface_(surface),
         style_(style),
         factors_(factors),
+        plain_(plain),
         held_(held),
         start_(std::move(start)),
         positions_(start_),
         limits_(contact, start_, progress),
-        laplacian_(surface, (factors.array() + 2.0).matrix(), held, progress) {
-    surface.rotations(positions_, rotations_);
-    folded_before_ = all_folded(surface, positions_, rotations_);
+        laplacian_(surface, (factors.array() + 2.0).matrix(), held, progress),
+        progress_(progress) {
+    begin_at(start_);
   }
 
   void step() {
@@ -158,6 +188,12 @@ class Finish {
     limits_.keep(positions_);
   }
 
+  /// Takes start and result this share of the way from rest.
+  void go_part_way(double share) {
+    begin_at(surface_.rest() + share * (start_ - surface_.rest()));
+    positions_ = surface_.rest() + share * (positions_ - surface_.rest());
+  }
+
   /// Moves the whole along a unit vector so that its lowest node keeps its height.
   void stand(const Vec3& up) {
     const double sunk = (start_ * up).minCoeff() - (positions_ * up).minCoeff();
@@ -173,6 +209,7 @@ class Finish {
     std::vector<std::int32_t> found = newly_folded();
     double share = 1.0;
     for (int round = 0; !found.empty(); ++round) {
+      progress_.check();
       std::vector<std::int32_t> moved;
       if (round < most_openings) {
         for (const std::int32_t t : found)
@@ -205,6 +242,12 @@ class Finish {
   const Points& positions() const { return positions_; }
 
  private:
+  void begin_at(Points start) {
+    start_ = std::move(start);
+    surface_.rotations(start_, rotations_);
+    folded_before_ = all_folded(surface_, start_, rotations_);
+  }
+
   std::vector<std::int32_t> newly_folded() const {
     const std::vector<char> now = all_folded(surface_, positions_, rotations_);
     std::vector<std::int32_t> result;
@@ -315,10 +358,12 @@ class Finish {
   /// Of the global step: Σ of each node's edges of w ((R_i + R_j) e + λ p), p an edge without its part along
   /// the direction that pulls.
   void set_right_hand_side() {
+    const Points normals = surface_.normals(positions_), around = normals_around(surface_, normals);
     pulls_.resize(surface_.triangles(), 3);  // the directions, by the root of how much they pull
     parallel_for(0, surface_.triangles(), sharpen_grain, [&](Index begin, Index end) {
       for (Index t = begin; t < end; ++t) {
-        const auto [pulling, pull] = style_.direction(t, surface_.normal(t, positions_).normalized());
+        const Vec3 own = normals.row(t).normalized(), mean = around.row(t);
+        const auto [pulling, pull] = style_.direction(t, own, (own + plain_[t] * (mean - own)).normalized());
         pulls_.row(t) = std::sqrt(pull) * pulling;
       }
     });
@@ -346,22 +391,23 @@ class Finish {
 
   const WeldedSurface& surface_;
   const StyleAtTriangles& style_;
-  const Vector& factors_;
+  const Vector &factors_, &plain_;
   const std::vector<char>& held_;
-  const Points start_;
+  Points start_;
   Points positions_, before_;
   std::vector<Mat3> rotations_;
   std::vector<char> folded_before_;
   ContactLimits limits_;
   SurfaceLaplacian laplacian_;
   Points pulls_, right_;  // of the global step
+  const Progress& progress_;
 };
 
 }  // namespace
 
 Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const Style& style,
                const SharpenOptions& options, const Progress& progress, const Vector& weights,
-               const std::optional<Vec3>& up, const Contact& contact) {
+               const std::optional<Vec3>& up, const Contact& contact, bool alone) {
   options.validate();
   validate(vertices, triangles);
   require_moved(vertices, moved);
@@ -383,10 +429,11 @@ Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const S
   progress.check();
   const WeldedSurface surface(mesh, moved, progress);
   const StyleAtTriangles at(style, surface, options);
-  const double weight = options.style_weight * at.share / options.rigidity;
-  Vector factors = weight * at.factors;
-  if (weight > 0.0 && surface.triangles() > 0)
-    factors = factors.cwiseProduct(relief_shares(surface, progress));
+  const bool part_way = alone && !contact.any() && options.strength < 1.0;
+  const double weight = options.style_weight * (part_way ? 1.0 : at.share) / options.rigidity;
+  Vector factors = weight * at.factors, plain = Vector::Ones(surface.triangles());
+  if (weight > 0.0 && surface.triangles() > 0) plain = plainness(surface, progress);
+  factors.array() *= detail_weight + (1.0 - detail_weight) * plain.array();
   std::vector<char> held(surface.nodes(), 0);
   if (weights.size() > 0) {
     Vector of_nodes = Vector::Constant(surface.nodes(), INFINITY);
@@ -400,15 +447,20 @@ Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const S
                     3.0;
   }
   Points result = moved;
-  if (surface.triangles() == 0 || options.iterations == 0 || !(factors.maxCoeff() > 0.0)) return result;
+  if (options.strength == 0.0 || surface.triangles() == 0 || options.iterations == 0 ||
+      !(factors.maxCoeff() > 0.0))
+    return result;
 
-  Finish finish(surface, surface.at_nodes(moved), at, factors, held, contact, progress);
+  Points start = surface.at_nodes(moved);
+  if (part_way) start = surface.rest() + (start - surface.rest()) / options.strength;
+  Finish finish(surface, std::move(start), at, factors, plain, held, contact, progress);
   for (Index step = 0; step < options.iterations; ++step) {
     progress.report(0.1 + 0.85 * static_cast<double>(step) / static_cast<double>(options.iterations),
                     "sharpening");
     finish.step();
   }
   progress.report(0.95, "sharpening");
+  if (part_way) finish.go_part_way(options.strength);
   if (up && std::find(held.begin(), held.end(), 1) == held.end()) finish.stand(up->normalized());
   finish.spare_folds();
   for (Index v = 0; v < vertices.rows(); ++v)

@@ -22,11 +22,13 @@ inline constexpr int centers_before_sharpen = 500, iterations_before_sharpen = 6
 /// one place that have stayed together do so; loose vertices stay, too. With `up`, and no vertex held, the
 /// lowest along it keeps its height. In `contact`, vertices enter no obstacle and do not pass the ground;
 /// those that are inside or nearer than a margin in `moved` go no further. Self-contact is refused: it would
-/// take searches for other parts in each step. Throws InvalidInput for a broken mesh, for moved vertices,
-/// weights or options that do not fit; Cancelled.
+/// take searches for other parts in each step. A strength below 1 is that of the field as well: the result
+/// lies that share of the way from rest to the style's whole shape, so that `moved` does, too. Where not
+/// `alone`, or in contact, strength scales the style's weight, as it does in stylize(). Throws InvalidInput
+/// for a broken mesh, for moved vertices, weights or options that do not fit; Cancelled.
 ARAPFIELDS_EXPORT Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const Style& style,
                                  const SharpenOptions& options = {}, const Progress& progress = {},
                                  const Vector& weights = {}, const std::optional<Vec3>& up = {},
-                                 const Contact& contact = {});
+                                 const Contact& contact = {}, bool alone = true);
 
 }  // namespace arapfields

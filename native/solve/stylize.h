@@ -14,10 +14,10 @@ namespace arapfields {
 /// Deforms a surface so that its normals turn to preferred ones, or to an object's, as rigidly as possible:
 ///   share·gauss_weight·style + rigidity·(stretch + bending·bend) + keep_stance·stance +
 ///   handles,
-/// share that of the strength (StyleAtSamples), ñ the unit normals of the deformed surface, and style the
-/// mean of u(1 − g(ñ)), or of 3 u‖ñ − T(n)‖². (The paper's text has the sign of the first term reversed and
-/// leaves the normals without unit length, which a collapsing surface would win.) Without handles the lowest
-/// sample, against the direction `up`, keeps its height, and the middle its place across it; with handles,
+/// share 1 of a style alone, whose field goes the strength's share of its way from rest; else that of the
+/// strength (StyleAtSamples). ñ are the deformed surface's unit normals, style the mean of u(1 − g(ñ)), or of
+/// 3 u‖ñ − T(n)‖². (In the paper its sign is reversed, and ñ has no unit length: a collapsing surface would
+/// win.) Without handles the lowest sample, against `up`, keeps its height, the middle its place; with them
 /// there is no stance. `weights` (one u ≥ 0 a sample, or empty) blend the effect. Strength 0 is the identity,
 /// and so is a sphere's style. External energies may depend on where the surface is: with them, a spring
 /// alone holds the lowest sample. An observer gets deform's terms, style and stance. Throws InvalidInput for

@@ -26,6 +26,7 @@
 #include "fields/apply_field.h"
 #include "fields/inverse.h"
 #include "fields/neural_field.h"
+#include "mesh/outward_triangles.h"
 #include "mesh/sample_mesh.h"
 #include "shapes.h"
 #include "skin/skin_weights.h"
@@ -263,6 +264,24 @@ BOOST_AUTO_TEST_CASE(libtorch_s_own_number_of_threads_comes_back) {
     BOOST_CHECK(serial);
   }
   BOOST_CHECK_EQUAL(library_threads(), before);
+}
+
+/// At least once in so many triangles, in each of the three passes over them.
+BOOST_AUTO_TEST_CASE(triangles_that_are_turned_outwards_hear_a_cancel) {
+  constexpr int most_at_once = 1 << 14;
+  const TriangleMesh mesh = shapes::torus(512, 128);
+  int checks = 0;
+  const Progress::Interruption counted = [&] {
+    ++checks;
+    return false;
+  };
+  Task task;
+  const Progress progress(&task, 0.0, 1.0, &counted);
+  const CancelScope scope(progress);
+  const Triangles facing = outward_triangles(mesh);
+  BOOST_CHECK_GE(checks, 3 * facing.rows() / most_at_once);
+  task.cancel();
+  BOOST_CHECK_THROW(outward_triangles(mesh), Cancelled);
 }
 
 // The live solver and its threads, and what several of them read; the thread sanitizer runs these.

@@ -74,12 +74,12 @@ def ball(count=1000):
     return af.sample_mesh(*meshes.sphere(0.7), count=count, seed=0)
 
 
-def test_strength_means_the_same_for_all_styles():
+def test_a_weight_means_the_same_for_all_styles():
     """Of what there is to turn on a ball, every style turns a like share; at one sharpness they do not."""
     samples = ball(count=400)
 
     def closed(style, **options):
-        how = af.StylizeOptions(field="radial", iterations=40, strength=0.5, **options)
+        how = af.StylizeOptions(field="radial", iterations=40, gauss_weight=0.6, **options)
         sharpness = options.get("sharpness", 0.0)
         preferred = af.preferred_normals(style)
         before = af.gauss_preference(samples.normals, preferred, sharpness=sharpness).mean()

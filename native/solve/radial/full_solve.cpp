@@ -107,6 +107,7 @@ using Shown = std::function<std::shared_ptr<DeformationField>()>;
 struct Bounds {
   double worst = std::numeric_limits<double>::infinity();  ///< states of higher energy are not previewed
   double least_gain = 0.0;  ///< least relative decrease in the iterations of a check
+  double share = 1.0;       ///< of the way from rest that previews go
 };
 
 /// Sum of the distances of handles that are held back.
@@ -160,6 +161,14 @@ class Convergence {
   int stalled_checks_ = 0;
 };
 
+/// Previews this share of the way from rest.
+void preview(const Progress& progress, const Shown& shown, double share) {
+  progress.preview([&](PointsIn points) -> Points {
+    const Points moved = shown()->at(points);
+    return share == 1.0 ? moved : points + share * (moved - points);
+  });
+}
+
 /// Solves until convergence, until the iterations or the time budget run out, or until the observer ends it.
 /// The solver's energy is the loss divided by `rigidity`.
 LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& progress,
@@ -187,7 +196,7 @@ LoopResult run(RadialSolver& live, const TrainingOptions& how, const Progress& p
     const double done = static_cast<double>(result.iterations) / iterations;
     live.solve(at_once, 0.0, progress.part(done, done + static_cast<double>(at_once) / iterations));
     const double value = live.report().value;
-    if (value <= bounds.worst) progress.preview([&](PointsIn points) { return shown()->at(points); });
+    if (value <= bounds.worst) preview(progress, shown, bounds.share);
     result.iterations += static_cast<int>(live.report().iterations);
     result.history.emplace_back(result.iterations, value);
     result.seconds = watch.seconds();
@@ -403,6 +412,10 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   live.interior = !handles.empty();  // a style alone acts everywhere alike
   const auto shape = std::make_shared<const RestShape>(
       samples, live.interior, static_cast<std::uint64_t>(options.training.seed), progress);
+  // A style alone is solved at strength 1, and then goes its share of the way from rest.
+  const bool alone = handles.empty() && !hooks.adds_terms() && !(hooks.contact && hooks.contact->any());
+  const double solved = alone && options.strength > 0.0 ? 1.0 : options.strength;
+  const double share = alone ? options.strength : 1.0;
   double worst = std::numeric_limits<double>::infinity();
   if (options.centers >= FullSolve::min_centers_for_coarse_start) {
     LiveOptions few = live;
@@ -411,19 +424,19 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
     few.coarse_centers = few.fine_centers / FullSolve::centers_a_coarse;
     RadialSolver quick(samples, handles, few, progress.part(0.0, 0.1), shape);
     quick.set_contact(hooks.contact, true, progress);
-    quick.set_style(style, options.strength, options.sharpness, weights, up);
-    const std::shared_ptr<const RadialField> first =
-        quick.solve(std::min(FullSolve::style_first_iterations, options.training.iterations), 0.0,
-                    progress.part(0.1, 0.15));
-    progress.preview([&](PointsIn points) { return first->at(points); });
+    quick.set_style(style, solved, options.sharpness, weights, up);
+    quick.solve(std::min(FullSolve::style_first_iterations, options.training.iterations), 0.0,
+                progress.part(0.1, 0.15));
+    preview(progress, [&] { return quick.field(); }, share);
     worst = quick.report().value;
   }
   RadialSolver solver(samples, handles, live, progress.part(0.15, 0.3), shape);
   solver.set_contact(hooks.contact, true, progress);
-  solver.set_style(style, options.strength, options.sharpness, weights, up);
+  solver.set_style(style, solved, options.sharpness, weights, up);
   const Shown shown = [&] { return solver.field(); };
-  const LoopResult loop = run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity,
-                              shown, {.worst = worst, .least_gain = FullSolve::least_style_gain});
+  const LoopResult loop =
+      run(solver, options.training, progress.part(0.3, 0.95), hooks, options.rigidity, shown,
+          {.worst = worst, .least_gain = FullSolve::least_style_gain, .share = share});
   solver.set_hooks({hooks.energies, 1.0 / options.rigidity, {}, hooks.terms});
   Unfolding how{FullSolve::unfolding * live.surface.barrier};
   how.rounds = options.surface.barrier > 0.0 && !was_ended(loop) ? FullSolve::unfolding_rounds : 0;
@@ -433,6 +446,10 @@ Solution stylize_radial(const SurfaceSamples& samples, const Style& style, const
   terms.rigidity = options.rigidity;
   terms.style = StyleAtSamples::of(style, samples.normals, options.sharpness);
   Candidate best = unfold(solver, samples, options.surface, terms, how, shown, progress.part(0.95, 0.98));
+  if (share < 1.0) {
+    solver.set_style(style, options.strength, options.sharpness, weights, up);
+    best = {shown(), solver.report(), {}};
+  }
   return finish(std::move(best), samples, terms, loop, progress);
 }
 

@@ -10,6 +10,7 @@
 #include "sampling/sample_weights.h"
 #include "solve/contact/continuation.h"
 #include "solve/radial/handle_motion.h"
+#include "solve/radial/part_way.h"
 #include "solve/radial/state.h"
 #include "solve/setup.h"
 
@@ -75,6 +76,14 @@ void anchor(RadialState& s) {
   if (s.problem.mirror) s.problem.mirror->symmetrise(s.shape.coefficients);
   ++s.shape.revision;
   s.handles.move_anchor(values.row(0).transpose() + shift);
+}
+
+std::shared_ptr<RadialField> field_of(const RadialState& s, RowMatrix<double> coefficients) {
+  auto result =
+      std::make_shared<RadialField>(s.problem.basis, std::move(coefficients), s.handles.influence());
+  result->set_frame(s.problem.frame());
+  result->set_rest_points(s.problem.energy_points);
+  return result;
 }
 
 /// Fills the report's figures of triangles that pass through each other.
@@ -153,7 +162,7 @@ void RadialSolver::set_symmetry(SymmetryPlane symmetry, const Progress& progress
   next.set_hooks(s.hooks);
   next.set_secondary_motion(s.dynamics.motion(), progress);
   next.set_contact(s.contact.contact(), s.in_one_go, progress);
-  next.adopt(*field());
+  next.adopt(*field_of(s, s.shape.coefficients));
   if (s.tracked.size() > 0) next.track(s.tracked.rest(), s.tracked.triangles());
   next.state_->report.setup_seconds += s.report.setup_seconds;
   *this = std::move(next);
@@ -239,15 +248,11 @@ void RadialSolver::track(PointsIn points, std::shared_ptr<const Triangles> trian
 
 PointsF RadialSolver::tracked() const {
   state_->tracked.set_influence(state_->handles.influence());
-  return state_->tracked.moved(state_->shape.coefficients);
+  return state_->tracked.moved(shown_coefficients(*state_));
 }
 
 std::shared_ptr<RadialField> RadialSolver::field() const {
-  const RadialState& s = *state_;
-  auto result = std::make_shared<RadialField>(s.problem.basis, s.shape.coefficients, s.handles.influence());
-  result->set_frame(s.problem.frame());
-  result->set_rest_points(s.problem.energy_points);
-  return result;
+  return field_of(*state_, shown_coefficients(*state_));
 }
 
 const std::vector<Handle>& RadialSolver::handles() const { return state_->handles.handles(); }

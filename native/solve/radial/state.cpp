@@ -8,6 +8,7 @@
 #include "energies/shared_motion.h"
 #include "sampling/sample_choice.h"
 #include "solve/held_parts.h"
+#include "solve/radial/part_way.h"
 #include "solve/warnings.h"
 
 namespace arapfields {
@@ -19,6 +20,17 @@ constexpr int most_uses = 16;
 constexpr double single_error = 1e-6;
 
 }  // namespace
+
+bool goes_part_way(const RadialState& s) {
+  return s.style.any() && s.style.request()->strength < 1.0 && !s.handles.any() && !s.dynamics.has_mass() &&
+         !s.contact.any() && !s.hooks.adds_terms();
+}
+
+RowMatrix<double> shown_coefficients(const RadialState& s) {
+  if (!goes_part_way(s)) return s.shape.coefficients;
+  const RowMatrix<double> rest = s.problem.basis.identity();
+  return rest + s.style.request()->strength * (s.shape.coefficients - rest);
+}
 
 RadialState::RadialState(const SurfaceSamples& samples, const LiveOptions& options, const Progress& progress,
                          std::shared_ptr<const RestShape> rest_shape,
@@ -93,7 +105,8 @@ JetTermList RadialState::jet_terms(std::optional<Body<double>> body) {
   JetTermSettings settings;
   if (const auto& weighted = style.style()) {
     settings.style = weighted->style;
-    settings.gauss = weighted->weight;
+    settings.gauss =
+        goes_part_way(*this) ? problem.options.gauss_weight * weighted->style.factor : weighted->weight;
   }
   if (const auto& weighted = style.stance(handles.any())) {
     settings.stance = weighted->stance;
@@ -204,7 +217,8 @@ template QuasiNewtonReport RadialState::descend(RadialPrecision<double>&, const 
 template <class Scalar>
 void RadialState::measure(RadialPrecision<Scalar>& precision) {
   const RadialObjective<Scalar>& measured = objective(precision);
-  const Eigen::VectorX<Scalar>& u = measurements(precision);
+  Eigen::VectorX<Scalar> u = measurements(precision);
+  if (goes_part_way(*this)) measured.measure(shown_coefficients(*this), u);
   report.terms = measured.parts(u);
   measured.with_jets(u, [&](JetView<const Scalar> jets) {
     const Eigen::VectorX<Scalar> weights = stiffness.weights().template cast<Scalar>(),

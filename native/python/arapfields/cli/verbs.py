@@ -87,14 +87,15 @@ def stylize(args):
         settings = {"handles": handles, "orientation": orientation, "up": up, "contact": contact}
         return af.stylize(samples, normals, options, **settings, task=task)
 
-    def finish(vertices, triangles, moved, handles):
+    def finish(vertices, triangles, moved, handles, field):
         shares = {name: getattr(options, name) for name in ("strength", "sharpness", "rigidity", "threads")}
         held = np.where(held_by(handles, vertices), 0.0, 1.0) if handles else None
         stands = {"weights": held} if handles else {"up": (0.0, 0.0, 1.0) if up is None else up}
 
         def run(task):
             sharpened = af.SharpenOptions(**shares)
-            further = {"orientation": orientation, **stands, "contact": contact, "task": task}
+            alone = not handles and isinstance(field, af.RadialField)
+            further = {"orientation": orientation, **stands, "contact": contact, "alone": alone, "task": task}
             return af.sharpen(vertices, triangles, moved, normals, sharpened, **further)
 
         return with_progress("finish", run, args.quiet)
@@ -189,7 +190,7 @@ def _extracted(sdf, args, field=None, finish=None):
 def _solve(args, solve, seed, needs_handles, finish=None):
     """Common part of deform and stylize.
 
-    `finish(vertices, triangles, moved, handles)` gives the final positions of a mesh moved by the field.
+    `finish(vertices, triangles, moved, handles, field)` gives final positions of a mesh moved by the field.
     """
     is_scan = af.GaussianSplats.is_file(args.input)
     with Outputs() as outputs:
@@ -215,7 +216,7 @@ def _solve(args, solve, seed, needs_handles, finish=None):
         bounds = np.array([points_on.points.min(0), points_on.points.max(0)])
         handles = build_handles(described, bounds) if described or needs_handles else []
         field = with_progress(args.verb, lambda task: solve(points_on, handles, task), args.quiet)
-        of_mesh = None if finish is None else partial(finish, handles=handles)
+        of_mesh = None if finish is None else partial(finish, handles=handles, field=field)
         if "--output" in places:
             outputs.write(places["--output"], lambda path: source.write_moved(path, field, of_mesh))
         if "--surface" in places:
