@@ -2,7 +2,7 @@
 #include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
-#include "core/file_error.h"
+#include "core/errors.h"
 #include "core/frame.h"
 #include "core/memory.h"
 #include "core/parallel.h"
@@ -10,6 +10,24 @@
 #include "tensors/device.h"
 
 namespace arapfields::python {
+
+SignalWatch::SignalWatch() {
+  const py::module_ threading = py::module_::import("threading");
+  main_thread_ = threading.attr("get_ident")().equal(threading.attr("main_thread")().attr("ident"));
+}
+
+bool SignalWatch::look() {
+  constexpr auto pause = std::chrono::milliseconds(50);
+  if (!main_thread_ || std::this_thread::get_id() != thread_) return false;
+  if (raised_) return true;
+  const auto now = std::chrono::steady_clock::now();
+  if (now - last_ < pause) return false;
+  last_ = now;
+  const py::gil_scoped_acquire acquire;
+  if (PyErr_CheckSignals() != 0) raised_.emplace();
+  return raised_.has_value();
+}
+
 void raise_diverged(const Diverged& error, const py::object& last_good) {
   const py::object type = py::module_::import("arapfields._native").attr("Diverged");
   const py::object raised = type(error.what());

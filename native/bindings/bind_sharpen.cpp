@@ -2,7 +2,7 @@
 #include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
-#include "bindings/styles.h"
+#include "bindings/solve_arguments.h"
 #include "sharpen/folded_triangles.h"
 #include "sharpen/sharpen.h"
 

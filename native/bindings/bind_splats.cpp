@@ -11,9 +11,9 @@
 #include "core/parallel.h"
 #include "io/splat_file.h"
 #include "io/splat_gltf.h"
+#include "splats/gaussian_splats.h"
 #include "splats/move_splats.h"
 #include "splats/sample_splats.h"
-#include "splats/transform_splats.h"
 
 namespace arapfields::python {
 namespace {
