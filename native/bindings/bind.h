@@ -78,8 +78,30 @@ auto run_long(Call&& call) {
 namespace py = pybind11;
 using namespace pybind11::literals;
 
+/// A member function of which None as the object is refused: pybind11 alone would take a null pointer.
+template <class Class, class Return, class... Args>
+auto method(Return (Class::*function)(Args...)) {
+  return [function](Class& self, Args... args) -> Return {
+    return (self.*function)(std::forward<Args>(args)...);
+  };
+}
+template <class Class, class Return, class... Args>
+auto method(Return (Class::*function)(Args...) const) {
+  return [function](const Class& self, Args... args) -> Return {
+    return (self.*function)(std::forward<Args>(args)...);
+  };
+}
+
 /// Raises Python's Diverged with the state that was kept as its attribute `last_good`.
 [[noreturn]] void raise_diverged(const Diverged& error, const py::object& last_good);
+
+/// Has NumPy's functions, where they ask for the lock of an interpreter that has ended, stop their thread as
+/// this module's other calls of Python do; on Linux.
+#if defined(__linux__)
+void stop_in_numpy();
+#else
+inline void stop_in_numpy() {}
+#endif
 
 void bind_core(py::module_& module);
 void bind_options(py::module_& module);

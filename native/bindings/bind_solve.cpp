@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/jet_arrays.h"
@@ -261,13 +260,13 @@ void bind_solve_testing(py::module_& module) {
             return py::make_tuple(result.loss, result.gradient);
           },
           "parameters"_a, "seed"_a = 0)
-      .def_property_readonly("size", &LossProbe::size);
+      .def_property_readonly("size", method(&LossProbe::size));
   py::class_<DevicePathScope, std::unique_ptr<DevicePathScope>>(
       testing, "DevicePath", "While it lives, tensors are worked on as on a device instead of by kernels.")
       .def(py::init<>());
   py::class_<EnergyTrial>(testing, "EnergyTrial", "The energy and its parameter gradient, for timing.")
       .def(py::init<const SurfaceSamples&, Index, double>(), "samples"_a, "batch"_a, "bending"_a)
-      .def("run", &EnergyTrial::run, py::call_guard<py::gil_scoped_release>());
+      .def("run", method(&EnergyTrial::run), py::call_guard<py::gil_scoped_release>());
 }
 
 }  // namespace arapfields::python

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/python_function.h"
 
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 
 namespace arapfields::python {
@@ -142,7 +141,7 @@ A subclass may set it.)")
 Whether the function is continuous. A subclass may set it to False.
 
 Where the function jumps from one sign to the other there is no surface, and extraction leaves the mesh open.)")
-      .def_property_readonly("frame", &ImplicitFunction::frame, "The Frame of the unit cube.");
+      .def_property_readonly("frame", method(&ImplicitFunction::frame), "The Frame of the unit cube.");
 }
 
 namespace {

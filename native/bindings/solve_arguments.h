@@ -3,7 +3,6 @@
 
 #include <vector>
 
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "energies/handles.h"
 #include "energies/style.h"
