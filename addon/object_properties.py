@@ -106,7 +106,8 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     )
     keep_rest: flag(
         "Keep the Rest",
-        "While all handles are pins, what is far from all but the anchors holds its place",
+        "As in files made before Locality: while all handles are pins, what is far from all but the "
+        "anchors holds its place",
     )
     keep_beyond: number(
         "Keep Beyond",

@@ -28,7 +28,9 @@ def native_handles(af, handles, rest, samples, reaches=True):
             counts[handle.name] = len(held)
             natives.append(region(af, handle, held, further))
         elif handle.kind == "PIN":
-            natives.append(region(af, handle, handle.pinned(samples.points), further))
+            natives.append(
+                region(af, handle, handle.pinned(samples.points, rest.vertices, rest.triangles), further)
+            )
         elif handle.kind == "FAR":
             held = far_from(handle, samples.points)
             natives += [region(af, handle, held, further)] if len(held) else []
@@ -53,7 +55,7 @@ def held_points(handles, rest, points):
         elif handle.kind in ("GROUP", "BONE"):
             held[holding.of(handle)] = True
         elif handle.kind == "PIN":
-            held[handle.pinned(points)] = True
+            held[handle.pinned(points, rest.vertices, rest.triangles)] = True
         elif handle.kind != "FAR":
             held[subdivided.inside(handle, points, rest.shown)[0]] = True
     return held

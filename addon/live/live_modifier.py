@@ -29,11 +29,11 @@ class LiveModifier:
         self.was_silent = bool(settings_of(source).silenced)
         self.was_playing = cache_modifier.is_playing(source)
         self.bind(context, source)
+        visibility.show_alone(source, source, for_now=True)
 
     def bind(self, context, source):
         """Binds the modifier, also after an edit of the source; `before` stays as it is."""
         motion.bind(context, source, live=True)
-        visibility.show_alone(source, source, for_now=True)
 
     def is_there(self):
         return True
@@ -68,8 +68,7 @@ class LiveModifier:
             if source.mode != "EDIT":
                 motion.restore(source, self.before)
                 motion.drop_empty_helper(source)
-                if self.before is not None:
-                    settings_of(source).moved_by = self.moved_by
+                settings_of(source).moved_by = self.moved_by
                 if not self.was_silent:
                     armatures.restore(source)
                 if self.was_playing:

@@ -94,9 +94,10 @@ class Session:
         )
 
     def advance(self):
-        """Continues to read for a moment; True once the worker is started."""
+        """Continues to read for a moment, to the end where a shape is to be held, which is said before the
+        step of undo; True once the worker is started."""
         if self.worker is None:
-            step_for(self._reading)
+            (run_to_completion if self.is_held else step_for)(self._reading)
         return self.worker is not None
 
     def wait(self, seconds, refined):
@@ -188,7 +189,11 @@ class Session:
             return stored.mark(source) != stored.UNSETTLED
         if self.is_restored:
             return False
-        return stored.mark(source) == stored.wanted(source, self.digest(self.reader.request(context)))
+        try:
+            now = self.digest(self.reader.request(context))
+        except SourceChanged:
+            return False
+        return stored.mark(source) == stored.wanted(source, now)
 
     def keep_shown(self):
         """With `keeps_shape`, makes the shape on display the one that stays when live mode ends."""

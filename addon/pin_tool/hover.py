@@ -10,6 +10,7 @@ from ..blender import mesh_arrays
 from ..blender.object_references import ObjectReference, settings_of, source_of
 from ..blender.splat_layouts import holds_splats
 from ..carried import carrying
+from ..core.geometry.connected import connected, parts_of
 from ..core.geometry.spaces import inverse, transform
 from ..field_modifier import motion
 from ..handles.empties import matrix_of
@@ -201,12 +202,16 @@ def splat_under(context, view, own):
 
 
 def lit(mesh, world, location, radius):
-    """(k, 3, 3) the triangles of a mesh with a corner within the radius of the location, in world space."""
+    """(k, 3, 3) the triangles of a mesh with a corner within the radius of the location, in world space, of
+    what is connected with it there."""
     points = mesh_arrays.positions(mesh).astype(np.float32)
     least = np.linalg.svd(world[:3, :3], compute_uv=False).min()  # smallest world length per local one
     middle = transform(inverse(world), location[None])[0]
     kept = ((points - middle.astype(np.float32)) ** 2).sum(axis=1) <= (radius / least) ** 2
     corners = mesh_arrays.triangles(mesh)
     chosen = transform(world, points[corners[kept[corners].any(axis=1)]].reshape(-1, 3)).reshape(-1, 3, 3)
-    near = np.linalg.norm(chosen - location, axis=2).min(axis=1) <= radius
-    return chosen[near].astype(np.float32)
+    chosen = chosen[np.linalg.norm(chosen - location, axis=2).min(axis=1) <= radius]
+    if len(chosen) and parts_of(chosen).any():  # more than one: the whole mesh tells which belong together
+        ball = (transform(world, points) - location) / radius
+        chosen = chosen[connected((chosen.mean(axis=1) - location) / radius, ball, corners)]
+    return chosen.astype(np.float32)

@@ -12,12 +12,14 @@ from mathutils.geometry import barycentric_transform, closest_point_on_tri
 
 from ..blender import mesh_arrays, modifier_stack, point_data
 from ..core.errors import UserError
+from ..core.geometry.connected import connected
 from ..core.geometry.rotations import best_rotation
 from ..core.geometry.spaces import transform
 from ..handles.empties import matrix_of
 
 CANDIDATES = 64  # number of triangles to search if the face is unknown
 LEAST = 12  # least number of points to measure the rotation
+LEAST_OWN = 3  # vertices that tell how a place turns
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,11 @@ def find(context, source, location, radius, face=None, face_count=None):
                 chosen = near(now, mesh_arrays.triangles(mesh), location)
             at_rest, moved = map_back(now, rest, chosen, location)
         about = around(rest, at_rest, radius)
+        if faces:
+            scale = 1 / max(radius, np.linalg.norm(rest[about] - at_rest, axis=1).max(), 1e-300)
+            ball = scale * (rest - at_rest)
+            own = connected(ball[about], ball, mesh_arrays.triangles(mesh))
+            about = about[own] if own.sum() >= LEAST_OWN else about
         weights = group_weights(source, mesh, about)
     size = float(np.linalg.norm(np.ptp(rest, axis=0)) / np.cbrt(abs(np.linalg.det(world[:3, :3])) or 1.0))
     return Place(at_rest, moved, best_rotation(rest[about], now[about]), size, weights)

@@ -240,6 +240,32 @@ def test_a_closed_slit_costs_what_an_open_one_does():
     assert max(energies[1:]) < 4.0 * energies[0]
 
 
+def differences(function, points, step):
+    """Central differences along the axes, as the last axis."""
+    ways = step * np.eye(3)
+    return np.stack([(function(points + way) - function(points - way)) / (2 * step) for way in ways], axis=-1)
+
+
+@pytest.mark.parametrize("gap", GAPS[1:])
+def test_derivatives_are_those_of_the_map_where_parts_touch(gap):
+    """What a place does not see is blended from its surroundings, and that changes from place to place too.
+
+    A difference that steps from one part to another says nothing: two of different length disagree there.
+    """
+    vertices, triangles, _, field = solved(gap)
+    middles = vertices[triangles[::3]].mean(axis=1)
+    for function, derivatives, size in (
+        (field, field.jacobian, 1.0),
+        (field.jacobian, field.hessian, 100.0),  # ψ changes within a hundredth of the bar's length
+    ):
+        wide, narrow = (differences(function, middles, step) for step in (1e-5, 5e-6))
+        axes = tuple(range(1, wide.ndim))
+        steady = np.abs(wide - narrow).max(axis=axes) < 1e-4 * size
+        assert np.mean(steady) > 0.998
+        off = np.abs(derivatives(middles) - wide).max(axis=axes)
+        assert off[steady].max() < 1e-4 * size
+
+
 # Neighbouring vertices of a bent animal; its field alone, without sides, stretches its edges by at most 1.17.
 LONGEST_EDGE = 1.3
 

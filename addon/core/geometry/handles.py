@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import UserError
+from .connected import connected
 from .rotations import best_rotation
 from .spaces import inverse, rigid_motion
 
@@ -46,11 +47,25 @@ class Handle:
         """(n,) whether the points lie in the rest box."""
         return (np.abs(self._in_box(points)) <= 1).all(axis=1)
 
-    def pinned(self, points):
-        """Indices of the points that a pin holds: those in its ball, or the nearest ones if these are few."""
-        away = (self._in_box(points) ** 2).sum(axis=1)
-        count = max(int((away <= 1).sum()), min(PIN_SAMPLES, len(points)))
-        return np.sort(np.argpartition(away, count - 1)[:count])
+    def pinned(self, points, vertices, triangles):
+        """Indices of the points that a pin holds: those in its ball that are connected with its place on the
+        mesh there, or the nearest ones that are, if these are few. Splats have no triangles: all are."""
+        local, corners = self._in_box(points), self._in_box(vertices)
+        away = np.linalg.norm(local, axis=1)
+        least = min(PIN_SAMPLES, len(points))
+        reach = max(1.0, np.partition(away, least - 1)[least - 1])
+        held, apart = np.zeros(0, dtype=np.int64), np.zeros(len(points), dtype=bool)
+        for factor in (1, 2, 4):  # the part in the ball may have few points itself
+            near = np.flatnonzero((away <= factor * reach) & ~apart)
+            scale = 1 / (factor * reach)
+            own = connected(scale * local[near], scale * corners, triangles)
+            apart[near[~own]] = True
+            held = near[own][np.argsort(away[near[own]], kind="stable")]
+            if len(held) >= least:
+                break
+        if not len(held):
+            held = away.argsort()[:1]
+        return np.sort(held[: max((away[held] <= 1).sum(), least)])
 
     def by_weight(self, weights):
         """Indices of points with (n,) weights of at least `hold_from`; if a bone has none, the largest."""

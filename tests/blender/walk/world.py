@@ -17,7 +17,7 @@ from addon.solver import frame_solver, setup
 from addon.solver.frame_solver import FrameSolver
 from addon.solver.source_reader import SourceReader
 
-WAIT = 30  # seconds for a shape to settle
+WAIT = 120  # seconds at most for a shape to settle; a busy machine needs them
 NAMES = ("Bar", "Ball", "Shell")
 FEW = {"coarse_centers": 10, "fine_centers": 40, "samples": 400}
 
