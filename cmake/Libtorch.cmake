@@ -26,7 +26,7 @@ foreach(name c10 torch_cpu torch)
   find_library(LIBTORCH_${name} NAMES ${name} PATHS "${LIBTORCH_DIR}/lib" NO_DEFAULT_PATH REQUIRED)
   target_link_libraries(libtorch::libtorch INTERFACE "${LIBTORCH_${name}}")
 endforeach()
-# The OpenMP library that libtorch brings along: a call tells it to keep to one thread (core/library_threads.h).
+# The OpenMP library that libtorch brings along: a call tells it to keep to one thread (core/parallel.h).
 file(GLOB LIBTORCH_OPENMP "${LIBTORCH_DIR}/lib/libgomp*.so*" "${LIBTORCH_DIR}/../torch.libs/libgomp*.so*"
   "${LIBTORCH_DIR}/lib/libomp.dylib")
 if(NOT LIBTORCH_OPENMP)

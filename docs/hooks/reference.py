@@ -15,8 +15,9 @@ INTRODUCTION = """# API reference
 Written from the docstrings of `arapfields` {version}. Arrays are NumPy, and what is taken for one
 (`ArrayLike`) may be anything [like them](extending.md#arrays); `n`, `m`, `p`, `k` are counts. All coordinates
 are the mesh's own unless a docstring says *cube*; distances are negative inside. Options go by name,
-`DeformOptions(bending=0.1)`, and have a method `to_dict()`. Bad arguments raise `InvalidInput`, a
-`ValueError` that names the argument, what was found and what is allowed.
+`DeformOptions(bending=0.1)`, and have a method `to_dict()`. Bad values raise `InvalidInput`, a
+`ValueError` that names the argument, what was found and what is allowed; arguments of another type raise
+`TypeError`.
 """
 
 

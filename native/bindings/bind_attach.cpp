@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "attach/attachment.h"
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "energies/alignment.h"
@@ -41,7 +40,7 @@ Fields of one live session are evaluated several times faster from the second on
       .def_property_readonly(
           "distances", [](const Attachment& self) { return self.distances(); },
           "(n,) from each point to the body's nearest sample, in mesh units.")
-      .def("__len__", &Attachment::size)
+      .def("__len__", method(&Attachment::size))
       .def("__repr__",
            [](const Attachment& self) { return "Attachment(" + std::to_string(self.size()) + " points)"; });
   module.def(

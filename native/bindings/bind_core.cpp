@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
-#include "core/file_error.h"
+#include "core/errors.h"
 #include "core/frame.h"
 #include "core/memory.h"
 #include "core/parallel.h"
@@ -10,6 +9,24 @@
 #include "tensors/device.h"
 
 namespace arapfields::python {
+
+SignalWatch::SignalWatch() {
+  const py::module_ threading = py::module_::import("threading");
+  main_thread_ = threading.attr("get_ident")().equal(threading.attr("main_thread")().attr("ident"));
+}
+
+bool SignalWatch::look() {
+  constexpr auto pause = std::chrono::milliseconds(50);
+  if (!main_thread_ || std::this_thread::get_id() != thread_) return false;
+  if (raised_) return true;
+  const auto now = std::chrono::steady_clock::now();
+  if (now - last_ < pause) return false;
+  last_ = now;
+  const py::gil_scoped_acquire acquire;
+  if (PyErr_CheckSignals() != 0) raised_.emplace();
+  return raised_.has_value();
+}
+
 void raise_diverged(const Diverged& error, const py::object& last_good) {
   const py::object type = py::module_::import("arapfields._native").attr("Diverged");
   const py::object raised = type(error.what());
@@ -63,10 +80,12 @@ void bind_core(py::module_& module) {
 
   py::class_<Task>(module, "Task", "Cancels a long call and reads its progress, from any thread.")
       .def(py::init<>())
-      .def("cancel", &Task::cancel, "Stops the running call, whose caller gets Cancelled within 0.2 s.")
-      .def_property_readonly("cancelled", &Task::cancelled)
-      .def_property_readonly("progress", &Task::progress, "Share of the work done, in [0, 1]; never falls.")
-      .def_property_readonly("message", &Task::message, "What the call is doing, in a few words.")
+      .def("cancel", method(&Task::cancel),
+           "Stops the running call, whose caller gets Cancelled within 0.2 s.")
+      .def_property_readonly("cancelled", method(&Task::cancelled))
+      .def_property_readonly("progress", method(&Task::progress),
+                             "Share of the work done, in [0, 1]; never falls.")
+      .def_property_readonly("message", method(&Task::message), "What the call is doing, in a few words.")
       .def("report", &Task::report, "fraction"_a, "message"_a = "",
            "Sets progress (kept if larger already) and message.")
       .def(
@@ -79,9 +98,9 @@ Requests previews of a later deform, stylize or wrap: positions of these points 
 
 There is one as soon as the solve has a first field, then one about every `seconds`. They take at most a
 third of the solve's time, and its result stays the same.)")
-      .def_property_readonly("previews", &Task::previews, "Number of previews so far.")
-      .def_property_readonly("looks", &Task::previews, "Older name of `previews`.")
-      .def_property_readonly("watched", &Task::watched, R"(
+      .def_property_readonly("previews", method(&Task::previews), "Number of previews so far.")
+      .def_property_readonly("looks", method(&Task::previews), "Older name of `previews`.")
+      .def_property_readonly("watched", method(&Task::watched), R"(
 Positions (n, 3) of the watched points in the latest preview, in single precision; (0, 3) before the first.)");
 
   py::class_<Frame>(module, "Frame",

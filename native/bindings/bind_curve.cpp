@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Curves of the plane: the energy's other dimension, from samples to field.
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/pickling.h"

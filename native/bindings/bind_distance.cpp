@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "core/parallel.h"
@@ -79,12 +78,12 @@ triangles are allowed. InvalidInput for a broken mesh.)")
             return run_long(nullptr, [&](const Progress& progress) { return sdf.gradients(p, progress); });
           },
           "points"_a, "Unit gradients (p, 3) of the distance, pointing outwards; on a triangle, its normal.")
-      .def_property_readonly("frame", &MeshSdf::frame, "The Frame of the unit cube, as in fit_sdf.")
+      .def_property_readonly("frame", method(&MeshSdf::frame), "The Frame of the unit cube, as in fit_sdf.")
       .def_property_readonly(
           "vertices", [](const MeshSdf& sdf) { return sdf.vertices(); }, "(n, 3) of the soup.")
       .def_property_readonly(
           "triangles", [](const MeshSdf& sdf) { return sdf.triangles(); }, "(m, 3) of the soup.")
-      .def_property_readonly("closed", &MeshSdf::continuous, "Whether the soup is closed.")
+      .def_property_readonly("closed", method(&MeshSdf::continuous), "Whether the soup is closed.")
       .def(
           "save",
           [](const MeshSdf&, const PathArgument&) {

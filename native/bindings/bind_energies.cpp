@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/jet_arrays.h"
 #include "bindings/pickling.h"
 #include "energies/arap.h"
 #include "energies/body.h"
-#include "energies/composed_probe.h"
+#include "energies/composed_energies.h"
 #include "energies/distortion.h"
 #include "energies/gauss.h"
 #include "energies/handles.h"
@@ -259,10 +258,10 @@ void bind_energies(py::module_& module) {
       .def(py::init([](const std::vector<Handle>& handles, const Points& samples) {
         return BoundHandles(handles, samples);
       }))
-      .def_property_readonly("sources", &BoundHandles::sources)
-      .def_property_readonly("targets", &BoundHandles::targets)
-      .def_property_readonly("members", &BoundHandles::members)
-      .def("retarget", &BoundHandles::retarget)
+      .def_property_readonly("sources", method(&BoundHandles::sources))
+      .def_property_readonly("targets", method(&BoundHandles::targets))
+      .def_property_readonly("members", method(&BoundHandles::members))
+      .def("retarget", method(&BoundHandles::retarget))
       .def("error", [](const BoundHandles& self, const Points& values) {
         const HandleError error = handle_error(self, values);
         return py::make_tuple(error.mean, error.max);
@@ -320,7 +319,7 @@ leaves no surface is kept.)")
             return style.turned(as_rotation(orientation, "orientation"));
           },
           "orientation"_a, "The object rotated by `orientation` (3, 3) about its centroid.")
-      .def_property_readonly("centroid", &ObjectStyle::centroid,
+      .def_property_readonly("centroid", method(&ObjectStyle::centroid),
                              "(3,) centroid of the solid, in mesh coordinates.")
       .def(py::pickle(
           [](const ObjectStyle& self) {

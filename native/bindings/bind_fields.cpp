@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/files.h"
@@ -7,7 +6,7 @@
 #include "bindings/reports.h"
 #include "fields/apply_field.h"
 #include "fields/inverse.h"
-#include "fields/invertible_probe.h"
+#include "fields/invertible_field.h"
 #include "io/files.h"
 
 namespace arapfields::python {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "bindings/arguments.h"
+#include "bindings/arrays.h"
 #include "bindings/files.h"
-#include "core/one_at_a_time.h"
+#include "core/task.h"
 #include "io/output_file.h"
 
 namespace arapfields::python {

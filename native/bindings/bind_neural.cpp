@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/files.h"
@@ -100,7 +99,7 @@ is softplus's beta. InvalidInput where shapes do not fit or numbers are not fini
                                    shape.softplus_sharpness);
           },
           "The network's numbers, as from_layers takes them: weights, biases, octaves, frequency, sharpness.")
-      .def_property_readonly("frame", &NeuralSdf::frame, "The Frame of the unit cube.")
+      .def_property_readonly("frame", method(&NeuralSdf::frame), "The Frame of the unit cube.")
       .def_property_readonly(
           "report", [](const py::object& self) { return FitReportResult(report_of(self)); },
           "The FitReport; AttributeError for a network that fit_sdf did not make.")
@@ -135,7 +134,7 @@ void bind_testing(py::module_& module) {
              return std::make_unique<JetTrial>(shape, points, order_of(order), 0);
            }),
            "points"_a, "order"_a, "width"_a = NetworkOptions().width, "layers"_a = NetworkOptions().layers)
-      .def("run", &JetTrial::run);
+      .def("run", method(&JetTrial::run));
   testing.def(
       "mlp_jets",
       [](const py::object& weights, const py::object& biases, int octaves, double frequency, double sharpness,

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
-#include "bindings/styles.h"
+#include "bindings/solve_arguments.h"
 #include "sharpen/folded_triangles.h"
 #include "sharpen/sharpen.h"
 

@@ -4,16 +4,15 @@
 #include <utility>
 #include <vector>
 
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/files.h"
 #include "core/parallel.h"
 #include "io/splat_file.h"
 #include "io/splat_gltf.h"
+#include "splats/gaussian_splats.h"
 #include "splats/move_splats.h"
 #include "splats/sample_splats.h"
-#include "splats/transform_splats.h"
 
 namespace arapfields::python {
 namespace {
@@ -115,7 +114,7 @@ Arrays are float32 and new each time.)")
 centers (n, 3); rotations (n, 4), unit quaternions (w, x, y, z); scales (n, 3), standard deviations along their
 axes; opacities (n,) from 0 to 1; harmonics (n, k, 3), colours of k = 1, 4, 9 or 16 real spherical harmonics.
 InvalidInput for other shapes and values.)")
-      .def("__len__", &GaussianSplats::size)
+      .def("__len__", method(&GaussianSplats::size))
       .def("__repr__",
            [](const GaussianSplats& self) {
              return "GaussianSplats(" + std::to_string(self.size()) + " splats, " +

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "bindings/arguments.h"
 #include "bindings/arrays.h"
 #include "bindings/bind.h"
 #include "bindings/python_function.h"

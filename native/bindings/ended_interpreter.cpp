@@ -8,7 +8,7 @@
 // process ends without it. The linker puts these functions in the places of Python's own (--wrap), in
 // pybind11 too; CMakeLists.txt takes their names from here. NumPy's functions, which let the lock go while
 // they copy, are called through pybind11's table of them, and stop there likewise.
-#include "bindings/ended_interpreter.h"
+#include "bindings/bind.h"
 
 #if defined(__linux__)
 

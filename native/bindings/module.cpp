@@ -1,9 +1,28 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bindings/bind.h"
-#include "bindings/ended_interpreter.h"
 #include "bindings/files.h"
-#include "bindings/uninitialised.h"
-#include "bindings/wrong_types.h"
+
+namespace arapfields::python {
+namespace {
+
+void* refuse_memory(std::size_t) {
+  throw py::type_error("the object was made by __new__ alone: its __init__ has not been called");
+}
+
+/// Has each class refuse, with a TypeError, an object of which __init__ has not been called.
+void refuse_uninitialised(const py::module_& module) {
+  // pybind11 allocates a value where an object without one is used, and would then read uninitialised memory.
+  for (const auto& [name, value] : py::dict(module.attr("__dict__")))
+    if (PyType_Check(value.ptr()) != 0) {
+      if (auto* known = py::detail::get_type_info(reinterpret_cast<PyTypeObject*>(value.ptr())))
+        known->operator_new = &refuse_memory;
+    } else if (py::isinstance<py::module_>(value)) {
+      refuse_uninitialised(py::reinterpret_borrow<py::module_>(value));
+    }
+}
+
+}  // namespace
+}  // namespace arapfields::python
 
 PYBIND11_MODULE(_native, module) {
   using namespace arapfields::python;
@@ -35,5 +54,4 @@ PYBIND11_MODULE(_native, module) {
   bind_solve_testing(module);
   bind_invertible_testing(module);
   refuse_uninitialised(module);
-  name_wrong_types(module);
 }

@@ -6,7 +6,6 @@
 #include "energies/arap.h"
 #include "energies/distortion.h"
 #include "optimize/iteration.h"
-#include "optimize/loop_result.h"
 #include "solve/contact/contact.h"
 
 namespace arapfields::python {

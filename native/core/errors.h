@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "core/export.h"
 
@@ -42,5 +43,21 @@ ARAPFIELDS_EXPORT void require_range(std::string_view argument, double value, do
 ARAPFIELDS_EXPORT void require_positive(std::string_view argument, double value);
 /// Throws InvalidInput unless the value is finite and 0 or more.
 ARAPFIELDS_EXPORT void require_not_negative(std::string_view argument, double value);
+
+/// A file or folder that the system does not let us read or write. Python sees OSError, or the subclass that
+/// belongs to the error number, with the name of the file.
+class ARAPFIELDS_EXPORT FileError : public std::runtime_error {
+ public:
+  FileError(const std::string& path, int number)
+      : std::runtime_error(path + ": " + std::generic_category().message(number)),
+        path_(path),
+        number_(number) {}
+  const std::string& path() const { return path_; }
+  int number() const { return number_; }  ///< errno's
+
+ private:
+  std::string path_;
+  int number_;
+};
 
 }  // namespace arapfields

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Vectors as wide as the instruction set at hand, for SIMD sources alone (SIMD_LEVEL names their namespace).
 #pragma once
 
 #include <cmath>
 #include <cstdint>
+
+// Vectors as wide as the instruction set at hand, for SIMD sources alone (SIMD_LEVEL names their namespace).
 #if defined(__AVX2__)
 #include <immintrin.h>
 #elif defined(ARAPFIELDS_NEON)  // the level's own definition: every 64-bit ARM compiler has __ARM_NEON
@@ -97,6 +98,69 @@ inline Scalar sum_of_lanes(Pack<Scalar> x) {
   Scalar result = 0;
   for (int i = 0; i < lanes<Scalar>; ++i) result += x[i];
   return result;
+}
+
+// e^x for packs, in SIMD sources.
+
+template <class Scalar>
+constexpr Scalar inverse_factorial(int n) {
+  double result = 1;
+  for (int k = 2; k <= n; ++k) result /= k;
+  return static_cast<Scalar>(result);
+}
+
+/// e^x to about one unit in the last place: x = n ln 2 + r, |r| ≤ ln 2 / 2, the series in r, times 2^n.
+/// Arguments are clamped to where the result is a normal number.
+template <class Scalar>
+inline Pack<Scalar> exponential(Pack<Scalar> x) {
+  using Traits = PackTraits<Scalar>;
+  const Pack<Scalar> low = broadcast(Traits::lowest_exponent), high = broadcast(Traits::highest_exponent);
+  x = x < low ? low : x;
+  x = x > high ? high : x;
+  const Pack<Scalar> shifted = x * Scalar(1.4426950408889634) + Traits::round_shift;
+  const Pack<Scalar> n = shifted - Traits::round_shift;
+  const Pack<Scalar> r = (x - n * Traits::ln2_high) - n * Traits::ln2_low;
+  Pack<Scalar> series = broadcast(inverse_factorial<Scalar>(Traits::exp_terms - 1));
+#pragma GCC unroll 16
+  for (int term = Traits::exp_terms - 2; term >= 0; --term)
+    series = series * r + inverse_factorial<Scalar>(term);
+  const typename Traits::Bits bits = ((typename Traits::Bits)shifted << Traits::mantissa_bits) + Traits::one;
+  return series * (Pack<Scalar>)bits;
+}
+
+// Points into packs and back, in SIMD sources.
+
+#if defined(ARAPFIELDS_NEON)
+/// As many points as there are lanes, by the instruction that deinterleaves triples.
+inline void load_interleaved(const float* from, Pack<float> (&out)[3]) {
+  const float32x4x3_t split = vld3q_f32(from);
+  for (int c = 0; c < 3; ++c) out[c] = (Pack<float>)split.val[c];
+}
+inline void load_interleaved(const double* from, Pack<double> (&out)[3]) {
+  const float64x2x3_t split = vld3q_f64(from);
+  for (int c = 0; c < 3; ++c) out[c] = (Pack<double>)split.val[c];
+}
+#endif
+
+/// Three components of `lanes` points from (n,3) rows starting at `from`; lanes past `valid` repeat the last.
+template <class Scalar>
+inline void load_points(const Scalar* from, std::int64_t valid, Pack<Scalar> (&out)[3]) {
+#if defined(ARAPFIELDS_NEON)
+  if (valid >= lanes<Scalar>) return load_interleaved(from, out);
+#endif
+  Scalar split[3][lanes<Scalar>];
+  const int last = valid < lanes<Scalar> ? static_cast<int>(valid) - 1 : lanes<Scalar> - 1;
+  for (int i = 0; i < lanes<Scalar>; ++i)
+    for (int c = 0; c < 3; ++c) split[c][i] = from[3 * (i < last ? i : last) + c];
+  for (int c = 0; c < 3; ++c) out[c] = load(split[c]);
+}
+
+/// Adds to the rows of the first `valid` lanes.
+template <class Scalar>
+inline void add_points(Scalar* to, std::int64_t valid, const Pack<Scalar> (&values)[3]) {
+  const int count = valid < lanes<Scalar> ? static_cast<int>(valid) : lanes<Scalar>;
+  for (int i = 0; i < count; ++i)
+    for (int c = 0; c < 3; ++c) to[3 * i + c] += values[c][i];
 }
 
 }  // namespace arapfields::SIMD_LEVEL

@@ -35,4 +35,13 @@ using Mat4 = Eigen::Matrix4d;
 template <class Scalar>
 using RowMatrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+/// Rows (n,3) of unit length; zeros stay.
+template <class Rows>
+Points unit_rows(const Eigen::MatrixBase<Rows>& rows) {
+  Points result = rows.rowwise().normalized();
+  for (Index i = 0; i < rows.rows(); ++i)
+    if (rows.row(i).isZero(0.0)) result.row(i).setZero();
+  return result;
+}
+
 }  // namespace arapfields

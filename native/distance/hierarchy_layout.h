@@ -9,8 +9,9 @@ namespace arapfields {
 /// Children of a node and triangles of a leaf: one vector of doubles, or half of one of floats, in AVX-512.
 constexpr int tree_width = 8;
 
-/// Bounding boxes and disks (distance/disk.h) of up to eight children, rounded outwards to single precision,
-/// coordinate by coordinate. child ≥ 0 is a node, child < 0 the packet ~child. Unused lanes come last.
+/// Bounding boxes and disks (distance/hierarchy.h) of up to eight children, rounded outwards to single
+/// precision, coordinate by coordinate. child ≥ 0 is a node, child < 0 the packet ~child. Unused lanes come
+/// last.
 struct alignas(64) WideNode {
   float low[3][tree_width];
   float high[3][tree_width];

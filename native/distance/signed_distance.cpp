@@ -14,7 +14,6 @@
 #include "distance/hierarchy.h"
 #include "distance/kernels.h"
 #include "distance/morton.h"
-#include "distance/triangle_packet.h"
 #include "mesh/is_closed.h"
 #include "mesh/outward_triangles.h"
 #include "mesh/triangle_mesh.h"

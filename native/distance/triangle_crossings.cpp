@@ -5,7 +5,7 @@
 #include <array>
 
 #include "core/parallel.h"
-#include "distance/bvh_topology.h"
+#include "distance/bvh.h"
 
 namespace arapfields {
 namespace {

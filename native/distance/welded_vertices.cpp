@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <map>
 
-#include "core/unit_rows.h"
+#include "core/types.h"
 #include "mesh/is_closed.h"
 
 namespace arapfields {

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The energies of this folder as compositions of tensor operations, for tensors on a GPU. Nothing is read
-// back, so the host does not wait for the device. `jets` and `cotangents` are (columns, n, 3), contiguous;
-// weight times the cotangents is added to the latter unless they are undefined. Values are means as in
-// arap.h, gauss.h, distortion.h, handles.h and stance.h, as tensors.
 #pragma once
 
 #include <string>
 
+#include "energies/arap.h"
+#include "energies/gauss.h"
+#include "energies/handles.h"
+#include "energies/stance.h"
 #include "tensors/tensor.h"
+
+// The energies of this folder as compositions of tensor operations, for tensors on a GPU. Nothing is read
+// back, so the host does not wait for the device. `jets` and `cotangents` are (columns, n, 3), contiguous;
+// weight times the cotangents is added to the latter unless they are undefined. Values are means as in
+// arap.h, gauss.h, distortion.h, handles.h and stance.h, as tensors.
 
 namespace arapfields {
 
@@ -76,5 +81,32 @@ Tensor composed_handles(const Tensor& jets, const Tensor& targets, const Tensor&
 /// weight.
 Tensor composed_stance(const Tensor& jets, const Tensor& rest, const Tensor& up, const Tensor& ground,
                        double weight, const EnergyTables& tables, Tensor cotangents);
+
+// The compositions of composed_energies.h on jets in main memory, with the kernels' signatures: for
+// comparison.
+
+template <class Scalar>
+ARAPFIELDS_EXPORT_TO_TESTS ArapValue probe_arap(JetView<const Scalar> jets, double bending, double weight,
+                                                JetView<Scalar> cotangents, ArapFactors<Scalar> factors);
+template <class Scalar>
+ARAPFIELDS_EXPORT_TO_TESTS double probe_gauss(JetView<const Scalar> jets, ConstPointsRef<Scalar> normals,
+                                              const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights,
+                                              const GaussPreference& preference, double weight,
+                                              JetView<Scalar> cotangents);
+template <class Scalar>
+ARAPFIELDS_EXPORT_TO_TESTS double probe_targets(
+    JetView<const Scalar> jets, ConstPointsRef<Scalar> normals, ConstPointsRef<Scalar> targets,
+    const Eigen::Ref<const Eigen::VectorX<Scalar>>& sample_weights, double weight,
+    JetView<Scalar> cotangents);
+template <class Scalar>
+ARAPFIELDS_EXPORT_TO_TESTS double probe_barrier(JetView<const Scalar> jets, double threshold, double weight,
+                                                JetView<Scalar> cotangents);
+template <class Scalar>
+ARAPFIELDS_EXPORT_TO_TESTS double probe_handles(JetView<const Scalar> jets, const HandleBatch<Scalar>& batch,
+                                                double weight, JetView<Scalar> cotangents);
+template <class Scalar>
+ARAPFIELDS_EXPORT_TO_TESTS double probe_stance(JetView<const Scalar> jets, ConstPointsRef<Scalar> rest,
+                                               const Stance& stance, double weight,
+                                               JetView<Scalar> cotangents);
 
 }  // namespace arapfields

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/errors.h"
-#include "core/jacobians.h"
+#include "core/jets.h"
 #include "energies/composed_energies.h"
 #include "energies/kernels.h"
 #include "energies/ranges.h"

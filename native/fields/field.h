@@ -7,7 +7,7 @@
 #include "core/jets.h"
 #include "core/types.h"
 #include "mesh/triangle_mesh.h"
-#include "optimize/matrix_place.h"
+#include "optimize/optimizer.h"
 
 namespace arapfields {
 
@@ -64,7 +64,7 @@ class ARAPFIELDS_EXPORT TrainableField : public DeformationField {
   /// All parameters, and their gradient, as one contiguous vector (p).
   virtual Tensor& parameters() = 0;
   virtual Tensor& gradient() = 0;
-  /// The places of matrices among the parameters, for optimizers of matrices (optimize/muon.h).
+  /// The places of matrices among the parameters, for optimizers of matrices (optimize/optimizer.h).
   virtual std::vector<MatrixPlace> matrices() const { return {}; }
   /// Adds an offset (cube coordinates) to f.
   virtual void translate(const Vec3& offset) = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fields/interior_embedding_kernel.h"
 
-#include "core/pack_exp.h"
+#include "core/pack.h"
 
 namespace arapfields::SIMD_LEVEL {
 namespace {

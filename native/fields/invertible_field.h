@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "core/jets.h"
 #include "fields/field.h"
 #include "neural/coupling_shape.h"
 
@@ -40,5 +41,17 @@ class InvertibleField final : public TrainableField {
   struct State;
   std::unique_ptr<State> state_;
 };
+
+// An invertible field with given numbers, in double precision on plain arrays: for comparison.
+
+/// Jets (columns, n, 3) at points (n,3), row by row; for given cotangents (the same size, or none) the flat
+/// parameter gradient; and preimages() of the jets' values.
+struct InvertibleProbe {
+  Vector jets, gradient;
+  Points preimages;
+};
+ARAPFIELDS_EXPORT_TO_TESTS InvertibleProbe probe_invertible(const CouplingShape& shape,
+                                                            const Vector& parameters, PointsIn points,
+                                                            JetOrder order, const Vector& cotangents);
 
 }  // namespace arapfields

@@ -3,7 +3,7 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "neural/parameters.h"
+#include "neural/layers.h"
 #include "tensors/views.h"
 
 namespace arapfields {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fields and signed distances as files. Each is one file in the layout of safetensors (io/archive.h), written
-// whole or not at all (io/output_file.h); nothing in a file is ever executed. What a file says of itself is
-// checked before memory is asked for, and what this release does not know is refused.
+// Fields and signed distances as files. Each is one file in the layout of safetensors (io/document.h),
+// written whole or not at all (io/output_file.h); nothing in a file is ever executed. What a file says of
+// itself is checked before memory is asked for, and what this release does not know is refused.
 #pragma once
 
 #include <memory>

@@ -5,8 +5,6 @@
 #include <system_error>
 
 #include "core/errors.h"
-#include "core/file_error.h"
-#include "io/path_text.h"
 #include "io/system_file.h"
 
 namespace arapfields {

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "core/errors.h"
-#include "core/file_error.h"
 #include "io/input_file.h"
 #include "io/output_file.h"
 

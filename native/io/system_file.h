@@ -1,12 +1,38 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// File operations that differ between POSIX systems and Windows. Descriptors are the C library's. Where the
-// system refuses, they return −1 or false, and errno is set.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
+
+namespace arapfields {
+
+// Names of files are UTF-8 in all interfaces; on POSIX systems they are whatever bytes the system has.
+
+/// Throws std::system_error on Windows for what is no UTF-8.
+inline std::filesystem::path path_of(const std::string& text) {
+#ifdef _WIN32
+  return std::u8string(text.begin(), text.end());
+#else
+  return text;
+#endif
+}
+
+inline std::string text_of(const std::filesystem::path& path) {
+#ifdef _WIN32
+  const std::u8string text = path.u8string();
+  return {text.begin(), text.end()};
+#else
+  return path.string();
+#endif
+}
+
+}  // namespace arapfields
+
+// File operations that differ between POSIX systems and Windows. Descriptors are the C library's. Where the
+// system refuses, they return −1 or false, and errno is set.
 
 namespace arapfields::system_file {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/errors.h"
-#include "core/unit_rows.h"
+#include "core/types.h"
 
 namespace arapfields {
 

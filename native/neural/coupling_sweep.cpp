@@ -4,11 +4,148 @@
 #include <algorithm>
 #include <cmath>
 
-#include "neural/column_kernels.h"
-#include "neural/plane_algebra.h"
+#include "core/jets.h"
+#include "core/jets2d.h"
+#include "neural/kernels.h"
 #include "tensors/operations.h"
 
 namespace arapfields {
+
+// Jets of scalars, columns as in core/jets.h: chain rule and product rule, and their pull-backs.
+
+/// The jet of a scalar with up to ten columns, or the cotangents of one.
+template <class Scalar>
+struct NumberJet {
+  Scalar c[10] = {};
+
+  Scalar& operator[](int i) { return c[i]; }
+  Scalar operator[](int i) const { return c[i]; }
+};
+
+/// A function's value and derivatives at one point.
+template <class Scalar>
+struct Derivatives {
+  Scalar value, first, second, third;
+};
+
+/// The jet of φ(u), by the chain rule.
+template <class Scalar>
+NumberJet<Scalar> chain(const Derivatives<Scalar>& phi, const NumberJet<Scalar>& u, int columns) {
+  NumberJet<Scalar> h;
+  h[0] = phi.value;
+  for (int i = 1; i < columns; ++i) h[i] = phi.first * u[i];
+  if (columns < 10) return h;
+  for (int j = 0; j < 3; ++j)
+    for (int k = j; k < 3; ++k)
+      h[second_column(j, k)] += phi.second * u[first_column(j)] * u[first_column(k)];
+  return h;
+}
+
+/// The pull-back of chain(): adds to the cotangents of u.
+template <class Scalar>
+void chain_back(const Derivatives<Scalar>& phi, const NumberJet<Scalar>& u,
+                const NumberJet<Scalar>& cotangents, NumberJet<Scalar>& back, int columns) {
+  Scalar curved = 0;
+  for (int i = 0; i < columns; ++i) back[i] += phi.first * cotangents[i];
+  for (int i = 1; i < columns; ++i) curved += u[i] * cotangents[i];
+  back[0] += phi.second * curved;
+  if (columns < 10) return;
+  for (int j = 0; j < 3; ++j)
+    for (int k = j; k < 3; ++k) {
+      const Scalar a = u[first_column(j)], b = u[first_column(k)], g = cotangents[second_column(j, k)];
+      back[0] += phi.third * a * b * g;
+      back[first_column(j)] += phi.second * b * g;
+      back[first_column(k)] += phi.second * a * g;
+    }
+}
+
+/// The jet of a·b, by the product rule.
+template <class Scalar>
+NumberJet<Scalar> product(const NumberJet<Scalar>& a, const NumberJet<Scalar>& b, int columns) {
+  NumberJet<Scalar> h;
+  h[0] = a[0] * b[0];
+  for (int i = 1; i < columns; ++i) h[i] = a[i] * b[0] + a[0] * b[i];
+  if (columns < 10) return h;
+  for (int j = 0; j < 3; ++j)
+    for (int k = j; k < 3; ++k)
+      h[second_column(j, k)] +=
+          a[first_column(j)] * b[first_column(k)] + a[first_column(k)] * b[first_column(j)];
+  return h;
+}
+
+/// The pull-back of product() by b: adds to the cotangents of b.
+template <class Scalar>
+void product_back(const NumberJet<Scalar>& a, const NumberJet<Scalar>& cotangents, NumberJet<Scalar>& back,
+                  int columns) {
+  for (int i = 0; i < columns; ++i) {
+    back[i] += a[0] * cotangents[i];
+    if (i > 0) back[0] += a[i] * cotangents[i];
+  }
+  if (columns < 10) return;
+  for (int j = 0; j < 3; ++j)
+    for (int k = j; k < 3; ++k) {
+      const Scalar g = cotangents[second_column(j, k)];
+      back[first_column(k)] += a[first_column(j)] * g;
+      back[first_column(j)] += a[first_column(k)] * g;
+    }
+}
+
+// Jets of one number by two others, columns as in core/jets2d.h: how they are lifted to jets of space, and
+// the way back.
+
+/// The jet of a function of the plane, or the cotangents of one.
+template <class Scalar>
+struct PlaneJet {
+  Scalar c[columns2] = {};
+
+  Scalar& operator[](int i) { return c[i]; }
+  Scalar operator[](int i) const { return c[i]; }
+};
+
+/// g(u, v), of g's jet there.
+template <class Scalar>
+NumberJet<Scalar> chain(const PlaneJet<Scalar>& g, const NumberJet<Scalar>& u, const NumberJet<Scalar>& v,
+                        int columns) {
+  NumberJet<Scalar> h;
+  h[0] = g[0];
+  for (int i = 1; i < columns; ++i) h[i] = g[1] * u[i] + g[2] * v[i];
+  if (columns < 10) return h;
+  for (int j = 1; j < 4; ++j)
+    for (int k = j; k < 4; ++k)
+      h[second_column(j - 1, k - 1)] +=
+          g[3] * u[j] * u[k] + g[4] * v[j] * v[k] + g[5] * (u[j] * v[k] + u[k] * v[j]);
+  return h;
+}
+
+/// Adds what the cotangents of g(u, v) ask to those of the derivatives of u and v, and returns what they ask
+/// of g's jet. The derivatives of g's jet at the values of u and v are the caller's.
+template <class Scalar>
+PlaneJet<Scalar> chain_back(const PlaneJet<Scalar>& g, const NumberJet<Scalar>& u, const NumberJet<Scalar>& v,
+                            const NumberJet<Scalar>& given, NumberJet<Scalar>& back_u,
+                            NumberJet<Scalar>& back_v, int columns) {
+  PlaneJet<Scalar> of_g;
+  of_g[0] = given[0];
+  for (int i = 1; i < columns; ++i) {
+    of_g[1] += u[i] * given[i];
+    of_g[2] += v[i] * given[i];
+    back_u[i] += g[1] * given[i];
+    back_v[i] += g[2] * given[i];
+  }
+  if (columns < 10) return of_g;
+  for (int j = 1; j < 4; ++j)
+    for (int k = j; k < 4; ++k) {
+      const Scalar w = given[second_column(j - 1, k - 1)];
+      of_g[3] += w * u[j] * u[k];
+      of_g[4] += w * v[j] * v[k];
+      of_g[5] += w * (u[j] * v[k] + u[k] * v[j]);
+      back_u[j] += w * (g[3] * u[k] + g[5] * v[k]);
+      back_u[k] += w * (g[3] * u[j] + g[5] * v[j]);
+      back_v[j] += w * (g[4] * v[k] + g[5] * u[k]);
+      back_v[k] += w * (g[4] * v[j] + g[5] * u[j]);
+    }
+  return of_g;
+}
+
 namespace {
 
 /// Columns of a plane jet that carry a jet of `columns` columns.

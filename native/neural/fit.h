@@ -8,7 +8,6 @@
 #include "core/task.h"
 #include "neural/neural_sdf.h"
 #include "optimize/iteration.h"
-#include "optimize/loop_result.h"
 #include "options/fit.h"
 
 namespace arapfields {

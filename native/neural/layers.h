@@ -5,8 +5,24 @@
 
 #include "core/types.h"
 #include "neural/mlp.h"
+#include "optimize/optimizer.h"
 
 namespace arapfields {
+
+// A network's numbers as one vector, and whether a shape can be had: what files need.
+
+/// Throws InvalidInput that names what is out of range.
+void validate(const MlpShape& shape);
+/// Weights and biases of all layers.
+Index parameter_count(const MlpShape& shape);
+
+/// The weights of the hidden layers, in the order of Mlp::parameters().
+std::vector<MatrixPlace> hidden_matrices(const MlpShape& shape);
+
+/// All numbers in the order of Mlp::parameters(), in single precision, and back. Throws InvalidInput where
+/// their count does not fit the shape.
+VectorF parameters_of(const Mlp& mlp);
+void set_parameters(Mlp& mlp, const VectorF& parameters);
 
 /// A network with these numbers.
 Mlp make_mlp(const Layers& layers, const MlpShape& shape, bool double_precision = false,

@@ -8,9 +8,9 @@
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "core/random.h"
+#include "neural/layers.h"
 #include "neural/mlp_sweep.h"
-#include "neural/parameters.h"
-#include "tensors/device_path.h"
+#include "tensors/device.h"
 #include "tensors/operations.h"
 
 namespace arapfields {

@@ -5,11 +5,223 @@
 #include <utility>
 
 #include "core/parallel.h"
-#include "neural/jet_layer.h"
-#include "tensors/device_path.h"
+#include "neural/kernels.h"
+#include "tensors/device.h"
 #include "tensors/operations.h"
+#include "tensors/views.h"
 
 namespace arapfields {
+namespace {
+
+template <class Scalar>
+ActivationBlock<Scalar> block_of(const LayerStep& step, Tensor& activations, const Tensor& slope) {
+  ActivationBlock<Scalar> block;
+  block.activations = activations.data<Scalar>();
+  block.slope = slope.defined() ? slope.data<Scalar>() : nullptr;
+  block.sharpness = static_cast<Scalar>(step.sharpness);
+  block.points = activations.size(0) / step.columns;
+  block.width = activations.size(1);
+  block.columns = step.columns;
+  return block;
+}
+
+template <class Scalar>
+void activate_on_cpu(const LayerStep& step, Tensor& activations, Tensor& slope, Tensor& jets,
+                     const Tensor& bias) {
+  ActivationBlock<Scalar> block = block_of<Scalar>(step, activations, slope);
+  block.bias = bias.data<Scalar>();
+  if (step.columns > 1) block.jets = jets.data<Scalar>();
+  ARAPFIELDS_DISPATCH(activate(block));
+}
+
+template <class Scalar>
+void activate_back_on_cpu(const LayerStep& step, Tensor& activations, const Tensor& slope,
+                          const Tensor& partial, Tensor& cotangents, Tensor& bias_gradient) {
+  const ActivationBlock<Scalar> block = block_of<Scalar>(step, activations, slope);
+  const Scalar* more = partial.defined() ? partial.data<Scalar>() : nullptr;
+  ARAPFIELDS_DISPATCH(activate_back(block, more, cotangents.data<Scalar>(), bias_gradient.data<Scalar>()));
+}
+
+template <class Scalar>
+void encode_on_cpu(const Tensor& points, double frequency, int octaves, Tensor& encoding) {
+  EncodingBlock<Scalar> block;
+  block.points = points.data<Scalar>();
+  block.value = encoding.data<Scalar>();
+  const Index size = encoding.stride(0);
+  if (encoding.size(0) > 1) block.first = block.value + size;
+  if (encoding.size(0) > 2) block.second = block.value + 2 * size;
+  block.frequency = frequency;
+  block.count = points.size(0);
+  block.octaves = octaves;
+  ARAPFIELDS_DISPATCH(encode(block));
+}
+
+Tensor by_column(const Tensor& activations, int columns) {
+  return activations.view({columns, activations.size(0) / columns, activations.size(1)});
+}
+
+void activate_composed(const LayerStep& step, Tensor& activations, Tensor& slope, Tensor& jets,
+                       const Tensor& bias) {
+  Tensor z = by_column(activations, step.columns), z0 = z[0];
+  const Tensor t = step.sharpness * (z0 + bias);
+  const Tensor s = sigmoid(t);
+  const Tensor value = (clamp_min(t, 0.0) + log1p(exp(-abs(t)))) / step.sharpness;
+  if (step.columns > 1) {
+    Tensor h = by_column(jets, step.columns);
+    h[0].assign(value);
+    h.from(0, 1).assign(s * z.from(0, 1));
+  }
+  z0.assign(value);
+  if (slope.defined()) slope.assign(s);
+}
+
+void activate_back_composed(const LayerStep& step, Tensor& activations, const Tensor& s,
+                            const Tensor& partial, Tensor& cotangents, Tensor& bias_gradient) {
+  Tensor z = by_column(activations, step.columns), g = by_column(cotangents, step.columns);
+  Tensor g0 = s * g[0];
+  if (step.columns > 1) g0 += step.sharpness * s * (1 - s) * sum(z.from(0, 1) * g.from(0, 1), {0});
+  g *= s;
+  g[0].assign(g0);
+  if (partial.defined()) cotangents += partial;
+  z.from(0, 1) *= s;
+  bias_gradient += sum(g[0], {0});
+}
+
+void encode_composed(const Tensor& points, double frequency, int octaves, Tensor& encoding) {
+  const Index n = points.size(0);
+  Vector frequencies(octaves);
+  for (int k = 0; k < octaves; ++k) frequencies[k] = std::ldexp(frequency, k);
+  const Tensor f = upload(tensor_view(frequencies), points);
+  const Tensor angle = points.to(NumberType::float64).unsqueeze(-1) * f;  // (n, 3, octaves)
+  const Tensor c = cos(angle), s = sin(angle);
+  encoding[0].assign(stack({c, s}, -1).view({n, 6 * octaves}));
+  if (encoding.size(0) > 1) encoding[1].assign(stack({-f * s, f * c}, -1).view({n, 6 * octaves}));
+  if (encoding.size(0) > 2) encoding[2].assign(stack({-f * f * c, -f * f * s}, -1).view({n, 6 * octaves}));
+}
+
+}  // namespace
+
+void activate_layer(const LayerStep& step, Tensor& activations, Tensor& slope, Tensor& jets,
+                    const Tensor& bias) {
+  if (on_device_path(activations)) return activate_composed(step, activations, slope, jets, bias);
+  if (activations.is_double()) return activate_on_cpu<double>(step, activations, slope, jets, bias);
+  activate_on_cpu<float>(step, activations, slope, jets, bias);
+}
+
+void activate_layer_back(const LayerStep& step, Tensor& activations, const Tensor& slope,
+                         const Tensor& partial, Tensor& cotangents, Tensor& bias_gradient) {
+  if (on_device_path(activations))
+    return activate_back_composed(step, activations, slope, partial, cotangents, bias_gradient);
+  if (activations.is_double())
+    return activate_back_on_cpu<double>(step, activations, slope, partial, cotangents, bias_gradient);
+  activate_back_on_cpu<float>(step, activations, slope, partial, cotangents, bias_gradient);
+}
+
+void encode_points(const Tensor& points, double frequency, int octaves, Tensor& encoding) {
+  if (on_device_path(points)) return encode_composed(points, frequency, octaves, encoding);
+  if (points.is_double()) return encode_on_cpu<double>(points, frequency, octaves, encoding);
+  encode_on_cpu<float>(points, frequency, octaves, encoding);
+}
+
+namespace {
+
+template <class Scalar>
+AdjointBlock<Scalar> block_of(double sharpness, const Tensor& activations, const Tensor& slope,
+                              const Tensor& adjoints, Tensor& below) {
+  AdjointBlock<Scalar> block;
+  block.activations = activations.data<Scalar>();
+  block.slope = slope.data<Scalar>();
+  block.adjoints = adjoints.data<Scalar>();
+  block.shared = adjoints.size(0) != below.size(0);
+  block.below = below.data<Scalar>();
+  block.sharpness = static_cast<Scalar>(sharpness);
+  block.points = slope.size(0);
+  block.width = slope.size(1);
+  block.outputs = static_cast<int>(below.size(0) / slope.size(0));
+  return block;
+}
+
+template <class Scalar>
+void adjoint_on_cpu(double sharpness, const Tensor& activations, const Tensor& slope, const Tensor& adjoints,
+                    Tensor& below, Tensor& second) {
+  const AdjointBlock<Scalar> block = block_of<Scalar>(sharpness, activations, slope, adjoints, below);
+  ARAPFIELDS_DISPATCH(adjoint(block, second.data<Scalar>()));
+}
+
+template <class Scalar>
+void adjoint_back_on_cpu(double sharpness, const Tensor& activations, const Tensor& slope,
+                         const Tensor& adjoints, const Tensor& second, Tensor& cotangents, Tensor& below,
+                         Tensor& partial) {
+  const AdjointBlock<Scalar> block = block_of<Scalar>(sharpness, activations, slope, adjoints, below);
+  ARAPFIELDS_DISPATCH(
+      adjoint_back(block, second.data<Scalar>(), cotangents.data<Scalar>(), partial.data<Scalar>()));
+}
+
+/// (rows/points, points, width), one row a time for all points where there is but one.
+Tensor by_output(const Tensor& rows, Index outputs) {
+  return rows.view({outputs, rows.size(0) / outputs, rows.size(1)});
+}
+
+/// Products of the derivatives z (3, n, width) by pairs of axes, (6, n, width): xx, yy, zz, xy, xz, yz.
+Tensor by_pairs(const Tensor& z) {
+  const Tensor pairs = empty({6, z.size(1), z.size(2)}, z);
+  multiply_elements(pairs.slice(0, 0, 3), z, z);
+  multiply_elements(pairs.slice(0, 3, 5), z.slice(0, 0, 1), z.slice(0, 1, 3));
+  multiply_elements(pairs.slice(0, 5, 6), z.slice(0, 1, 2), z.slice(0, 2, 3));
+  return pairs;
+}
+
+void adjoint_composed(double sharpness, const Tensor& activations, const Tensor& s, const Tensor& adjoints,
+                      Tensor& below, Tensor& second) {
+  const Index outputs = second.size(2), n = s.size(0), width = s.size(1);
+  const Tensor z = activations.view({4, n, width}).from(0, 1);
+  const Tensor q = by_output(adjoints, outputs).expand({outputs, n, width}), curve = sharpness * s * (1 - s);
+  by_output(below, outputs).assign(s * q);
+  second += batch_product((curve * by_pairs(z)).transpose(0, 1), q.permute({1, 2, 0}));
+}
+
+void adjoint_back_composed(double sharpness, const Tensor& activations, const Tensor& s,
+                           const Tensor& adjoints, const Tensor& second, Tensor& cotangents, Tensor& below,
+                           Tensor& partial) {
+  const Index outputs = second.size(2), n = s.size(0), width = s.size(1);
+  const Tensor z = activations.view({4, n, width}).from(0, 1);
+  const Tensor q = by_output(adjoints, outputs).expand({outputs, n, width}), curve = sharpness * s * (1 - s);
+  Tensor g = by_output(cotangents, outputs), part = partial.view({4, n, width});
+  const Tensor bent = batch_product(second.transpose(1, 2), by_pairs(z).transpose(0, 1)).transpose(0, 1);
+  // Of each pair Σ q d over the outputs; a pair of one axis acts on its derivative twice.
+  const Tensor weighted = batch_product(second, q.transpose(0, 1)).transpose(0, 1) * curve;
+  weighted.slice(0, 0, 3) *= 2.0;
+  const Tensor x = weighted[0], y = weighted[1], w = weighted[2];
+  const Tensor xy = weighted[3], xw = weighted[4], yw = weighted[5];
+  const Tensor matrix = stack({x, xy, xw, xy, y, yw, xw, yw, w}, 0).view({3, 3, n, width});
+  part.from(0, 1).assign(sum(matrix * z, {1}));
+  part[0].assign(curve * sum(q * (g + sharpness * (1 - 2 * s) * bent), {0}));
+  g.assign(s * g + curve * bent);
+  by_output(below, outputs).assign(s * q);
+}
+
+}  // namespace
+
+void adjoint_layer(double sharpness, const Tensor& activations, const Tensor& slope, const Tensor& adjoints,
+                   Tensor& below, Tensor& second) {
+  if (on_device_path(activations))
+    return adjoint_composed(sharpness, activations, slope, adjoints, below, second);
+  if (activations.is_double())
+    return adjoint_on_cpu<double>(sharpness, activations, slope, adjoints, below, second);
+  adjoint_on_cpu<float>(sharpness, activations, slope, adjoints, below, second);
+}
+
+void adjoint_layer_back(double sharpness, const Tensor& activations, const Tensor& slope,
+                        const Tensor& adjoints, const Tensor& second, Tensor& cotangents, Tensor& below,
+                        Tensor& partial) {
+  if (on_device_path(activations))
+    return adjoint_back_composed(sharpness, activations, slope, adjoints, second, cotangents, below, partial);
+  if (activations.is_double())
+    return adjoint_back_on_cpu<double>(sharpness, activations, slope, adjoints, second, cotangents, below,
+                                       partial);
+  adjoint_back_on_cpu<float>(sharpness, activations, slope, adjoints, second, cotangents, below, partial);
+}
+
 namespace {
 
 /// The first rows·cols numbers of a flat buffer as a matrix.

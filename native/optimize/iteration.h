@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace arapfields {
@@ -24,5 +25,15 @@ struct Iteration {
 /// Called after each iteration, on the caller's thread: false ends the loop with the current parameters
 /// (StopReason::observer). Exceptions are passed on. With a GPU, each call waits for the device.
 using IterationObserver = std::function<bool(const Iteration&)>;
+
+/// Why a loop ended.
+enum class StopReason { iterations, time_budget, target, observer, divergence };
+
+struct LoopResult {
+  int iterations = 0;
+  double seconds = 0.0;
+  StopReason stopped_by = StopReason::iterations;
+  std::vector<std::pair<int, double>> history;  ///< (iteration, loss), at most a few hundred entries
+};
 
 }  // namespace arapfields

@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "core/parallel.h"
-#include "core/stopwatch.h"
-#include "tensors/device_path.h"
+#include "core/task.h"
+#include "tensors/device.h"
 #include "tensors/operations.h"
 #include "tensors/views.h"
 

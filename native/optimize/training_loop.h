@@ -7,7 +7,6 @@
 #include "core/errors.h"
 #include "core/task.h"
 #include "optimize/iteration.h"
-#include "optimize/loop_result.h"
 #include "optimize/optimizer.h"
 
 namespace arapfields {

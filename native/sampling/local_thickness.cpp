@@ -6,8 +6,8 @@
 
 #include "core/frame.h"
 #include "core/parallel.h"
-#include "sampling/canonical_order.h"
 #include "sampling/inner_balls.h"
+#include "sampling/sample_choice.h"
 
 namespace arapfields {
 namespace {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Selection of subsets of samples.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +6,8 @@
 
 #include "core/random.h"
 #include "core/types.h"
+
+// Selection of subsets of samples.
 
 namespace arapfields {
 
@@ -22,5 +23,13 @@ std::vector<Index> missed_rows(PointsIn points, const std::vector<Index>& chosen
 
 Points rows_of(PointsIn points, const std::vector<Index>& rows);
 Vector entries_of(const Vector& numbers, const std::vector<Index>& rows);
+
+/// Indices of the points along a Z-order curve in their principal axes, so that neighbours in the list are
+/// neighbours in space. The order does not change when the points are rotated, moved, scaled or mirrored, and
+/// hardly changes when a few outliers are added.
+std::vector<std::uint32_t> canonical_order(PointsIn points);
+
+/// `count` evenly spaced entries of the list, or all if it has no more.
+std::vector<Index> evenly(const std::vector<std::uint32_t>& list, Index count);
 
 }  // namespace arapfields

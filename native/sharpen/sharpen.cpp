@@ -8,7 +8,7 @@
 #include "core/errors.h"
 #include "core/memory.h"
 #include "core/parallel.h"
-#include "core/unit_rows.h"
+#include "core/types.h"
 #include "energies/gauss.h"
 #include "energies/rotation.h"
 #include "mesh/outward_triangles.h"

@@ -9,7 +9,6 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "distance/signed_distance.h"
-#include "sampling/canonical_order.h"
 #include "sampling/nearest_sample.h"
 #include "sampling/sample_choice.h"
 #include "skin/bone_regions.h"

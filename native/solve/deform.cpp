@@ -13,7 +13,7 @@
 #include "solve/radial/full_solve.h"
 #include "solve/report.h"
 #include "solve/setup.h"
-#include "solve/trained/invertible_objective.h"
+#include "solve/trained/objective.h"
 #include "solve/warnings.h"
 #include "tensors/device.h"
 

@@ -7,7 +7,7 @@
 
 #include "solve/mesh_measures.h"
 #include "solve/solution.h"
-#include "solve/trained/field_objective.h"
+#include "solve/trained/objective.h"
 
 namespace arapfields {
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "core/errors.h"
-#include "core/stopwatch.h"
+#include "core/task.h"
 #include "energies/handles.h"
 #include "mesh/sample_mesh.h"
 #include "mesh/surface_samples.h"

@@ -10,7 +10,7 @@
 #include "energies/arap.h"
 #include "energies/distortion.h"
 #include "fields/field.h"
-#include "optimize/loop_result.h"
+#include "optimize/iteration.h"
 #include "solve/contact/contact.h"
 
 namespace arapfields {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "sampling/canonical_order.h"
+#include "sampling/sample_choice.h"
 
 namespace arapfields {
 namespace {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/task.h"
 #include "core/types.h"
 
 namespace arapfields {
@@ -32,5 +33,11 @@ struct ARAPFIELDS_EXPORT GaussianSplats {
 
 /// R with the axes of a unit quaternion (w, x, y, z) as columns.
 Mat3 axes_of(const Eigen::Ref<const Eigen::RowVector4f>& rotation);
+
+/// Splats under an affine map x → A x + t: centers, covariances A Σ Aᵀ, and colours turned by the rotation
+/// closest to A. Throws InvalidInput that names `matrix` where its last row is not (0, 0, 0, 1) or det A is
+/// not above 0, as for splats that do not fit together, and Cancelled.
+ARAPFIELDS_EXPORT GaussianSplats transform_splats(const GaussianSplats& splats, const Mat4& matrix,
+                                                  const Progress& progress = {});
 
 }  // namespace arapfields

@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-#include "tensors/device_path.h"
+#include "tensors/device.h"
 
 namespace arapfields {
 namespace {

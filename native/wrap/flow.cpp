@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/errors.h"
-#include "core/jacobians.h"
+#include "core/jets.h"
 #include "core/parallel.h"
 #include "distance/morton.h"
 #include "energies/rotation.h"

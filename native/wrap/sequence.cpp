@@ -7,7 +7,7 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "core/stopwatch.h"
+#include "core/task.h"
 #include "distance/morton.h"
 #include "sampling/sample_choice.h"
 #include "solve/setup.h"

@@ -12,7 +12,7 @@
 #include "core/errors.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "core/unit_rows.h"
+#include "core/types.h"
 #include "distance/mesh_sdf.h"
 #include "distance/welded_vertices.h"
 #include "mesh/sample_mesh.h"

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/parallel.h"
-#include "core/stopwatch.h"
+#include "core/task.h"
 #include "distance/morton.h"
 #include "sampling/sample_choice.h"
 #include "solve/setup.h"

@@ -13,13 +13,11 @@
 #include <string>
 
 #include "core/errors.h"
-#include "core/file_error.h"
 #include "fields/neural_field.h"
 #include "fields/radial_field.h"
 #include "io/files.h"
 #include "io/input_file.h"
 #include "io/output_file.h"
-#include "io/path_text.h"
 #include "io/system_file.h"
 
 using namespace arapfields;

@@ -17,10 +17,9 @@
 
 #include "attach/attachment.h"
 #include "core/errors.h"
-#include "core/one_at_a_time.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "core/thread_pool.h"
+#include "core/task.h"
 #include "distance/mesh_sdf.h"
 #include "energies/object_style.h"
 #include "fields/apply_field.h"

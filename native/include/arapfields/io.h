@@ -2,6 +2,6 @@
 // Fields and signed distances as files: save_field, load_field, save_sdf, load_sdf, OutputFile; FileError.
 #pragma once
 
-#include "core/file_error.h"
+#include "core/errors.h"
 #include "io/files.h"
 #include "io/output_file.h"

@@ -7,4 +7,3 @@
 #include "splats/gaussian_splats.h"
 #include "splats/move_splats.h"
 #include "splats/sample_splats.h"
-#include "splats/transform_splats.h"

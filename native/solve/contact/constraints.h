@@ -7,7 +7,7 @@
 
 #include "fields/influence.h"
 #include "solve/contact/points.h"
-#include "solve/contact/self_crossings.h"
+#include "solve/contact/self_contact.h"
 #include "solve/contact/sides.h"
 #include "solve/contact/surface.h"
 #include "solve/radial/secondary_motion.h"

@@ -7,9 +7,9 @@
 #include <numbers>
 
 #include "core/decompositions.h"
-#include "core/jacobians.h"
+#include "core/jets.h"
 #include "core/random.h"
-#include "core/unit_rows.h"
+#include "core/types.h"
 #include "sampling/oriented_points.h"
 #include "sampling/sample_choice.h"
 #include "sampling/standing_out.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/radial/blend.h"
 
-#include "core/product_rule.h"
+#include "core/jets.h"
 
 namespace arapfields {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "core/errors.h"
 #include "core/parallel.h"
-#include "core/stopwatch.h"
+#include "core/task.h"
 #include "solve/contact/forces.h"
 #include "solve/contact/handles.h"
 #include "solve/radial/handle_motion.h"

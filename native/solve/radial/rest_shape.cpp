@@ -3,7 +3,6 @@
 
 #include "core/random.h"
 #include "fields/mirror.h"
-#include "sampling/canonical_order.h"
 #include "sampling/sample_choice.h"
 #include "solve/contact/points.h"
 #include "solve/setup.h"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/one_at_a_time.h"
+#include "core/task.h"
 #include "fields/radial_basis.h"
 #include "mesh/surface_samples.h"
 #include "options/choices.h"

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/jets.h"
 #include "core/parallel.h"
-#include "core/product_rule.h"
 #include "fields/radial_evaluator.h"
 #include "sampling/sample_choice.h"
 #include "tensors/dense.h"

@@ -4,7 +4,6 @@
 #include "core/parallel.h"
 #include "fields/neural_field.h"
 #include "solve/setup.h"
-#include "solve/trained/cycle.h"
 #include "solve/trained/objective.h"
 #include "tensors/device.h"
 

@@ -4,8 +4,8 @@
 #include "core/parallel.h"
 #include "fields/neural_field.h"
 #include "fields/radial_evaluator.h"
-#include "sampling/canonical_order.h"
-#include "solve/trained/field_objective.h"
+#include "sampling/sample_choice.h"
+#include "solve/trained/objective.h"
 #include "tensors/views.h"
 
 namespace arapfields {

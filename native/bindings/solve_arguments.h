@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "bindings/arguments.h"
+#include <vector>
+
 #include "bindings/arrays.h"
+#include "energies/handles.h"
 #include "energies/style.h"
 #include "energies/styles.h"
 
 namespace arapfields::python {
+
+/// The handles of an iterable. Throws InvalidInput that names the first item that is no handle.
+inline std::vector<Handle> as_handles(const py::object& handles) {
+  return as_items<Handle>(handles, "handles", "CuboidHandles, PointHandles or RegionHandles are needed");
+}
 
 /// A style's name, preferred normals (k,3), or an ObjectStyle.
 inline Style as_style(const NormalsArgument& style, const std::string& name = "normals") {
