@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Says once, when the extension is first enabled, where it is to be found.
+"""The first run: what was installed, and where the panel is."""
 
-The text is in the 3D views for a while, where it takes no key and hides behind no window.
-"""
-
+import importlib.util
+import sys
 import time
 
 import blf
@@ -13,6 +12,11 @@ from .blender import host
 from .blender.host import redraw
 from .blender.language import translated
 from .blender.user_preferences import preferences
+from .core.runtime import native
+
+# Says once, when the extension is first enabled, where it is to be found.
+#
+# The text is in the 3D views for a while, where it takes no key and hides behind no window.
 
 SECONDS = 40.0
 SIZE, LEFT, BOTTOM = 14, 90, 40  # of the text and its place in a 3D view, in pixels at UI scale 1
@@ -74,3 +78,29 @@ def draw():
 def start():
     if host.has_window() and not host.is_module():
         host.start(show, first=1.0)
+
+
+# Says at once when what was installed is the source code: enabled, but without a native library.
+
+
+def is_complete():
+    """Whether the library is there; looking for it does not load it."""
+    return importlib.util.find_spec("arapfields") is not None
+
+
+def show_problem():
+    lines = translated(native.problem()).split(". ")
+
+    def draw(menu, _):
+        for line in lines:
+            menu.layout.label(text=line.rstrip(".") + ".")
+
+    bpy.context.window_manager.popup_menu(draw, title="ARAP Fields cannot work", icon="ERROR")
+
+
+def check_installation():
+    if is_complete():
+        return
+    print(f"ARAP Fields: {native.problem()}", file=sys.stderr, flush=True)
+    if host.has_window() and not host.is_module():
+        host.start(show_problem, first=0.1)

@@ -6,7 +6,7 @@ import contextlib
 import bpy
 from bpy.app.handlers import persistent
 
-from . import commands, first_run, install_check, menus
+from . import commands, first_run, menus
 from .blender import former_defaults, host, icons, language, modifier_stack
 from .blender.host import has_window
 from .blender.language import translated
@@ -139,7 +139,7 @@ PARTS = (  # what begins with the extension, and how it ends
     (menus.begin, menus.end),
     (first_run.start, None),
     (host.start_loading, None),
-    (install_check.start, None),
+    (first_run.check_installation, None),
     (tool.register, tool.unregister),
 )
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().

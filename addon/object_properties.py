@@ -1,24 +1,77 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""object.arapfields: the settings, handles and results of one object."""
+"""Settings of the three solves, made from the tables of core/settings."""
 
 import bpy
 
 from .animation.properties import ARAPFIELDS_PG_bake
 from .blender.object_references import owner_of, settings_of
-from .blender.property_definitions import choice, collection, flag, integer, number, pointer, tells, text
+from .blender.property_definitions import (
+    choice,
+    collection,
+    flag,
+    group_annotations,
+    integer,
+    number,
+    pointer,
+    tells,
+    text,
+)
 from .blender.selection import row_chosen
 from .contact.properties import ARAPFIELDS_PG_contact
-from .core.settings.choices import NORMALS
+from .core.settings.choices import NORMALS, STYLIZE
+from .core.settings.parameters import DEFORM, FIT, QUALITIES
 from .handles.properties import ARAPFIELDS_PG_handle
 from .live.properties import ARAPFIELDS_PG_secondary
 from .names import BONE_NUMBER, PROPERTY
 from .pin_tool.properties import ARAPFIELDS_PG_scene
-from .properties.choices import RESULT_ITEMS, extraction, output, result, surface
-from .properties.records import ARAPFIELDS_PG_carried
-from .properties.solve_settings import ARAPFIELDS_PG_deform, ARAPFIELDS_PG_fit, ARAPFIELDS_PG_stylize
+from .properties.choices import (
+    RESULT_ITEMS,
+    ARAPFIELDS_PG_carried,
+    extraction,
+    orientation,
+    output,
+    quality,
+    result,
+    style,
+    surface,
+)
 from .skin.properties import ARAPFIELDS_PG_skin
 from .stiffness.properties import ARAPFIELDS_PG_stiffness
 from .wrap.properties import ARAPFIELDS_PG_wrap
+
+
+def apply_quality(group, context):
+    for name, value in QUALITIES[group.quality][2].items():
+        setattr(group, name, value)
+
+
+def group(name, parameters, **further):
+    annotated = {**further, **group_annotations(parameters)}
+    return type(name, (bpy.types.PropertyGroup,), {"__annotations__": annotated})
+
+
+ARAPFIELDS_PG_fit = group("ARAPFIELDS_PG_fit", FIT, quality=quality(update=apply_quality))
+ARAPFIELDS_PG_deform = group("ARAPFIELDS_PG_deform", DEFORM)
+ARAPFIELDS_PG_stylize = group(
+    "ARAPFIELDS_PG_stylize",
+    STYLIZE,
+    style=style(),
+    frame=orientation(),
+    frame_object=pointer(bpy.types.Object, "Axes Of", "Object along whose axes the style stands"),
+    region=text("Region", "Vertex group whose weights say how strongly the style acts; empty for everywhere"),
+    style_object=pointer(
+        bpy.types.Object,
+        "Normals Of",
+        "Object whose axes or shape the surface turns towards, for styles of that kind",
+    ),
+    region_material=pointer(
+        bpy.types.Material, "Material", "Material on whose faces the style acts; empty for everywhere"
+    ),
+    use_handles=flag("Follow Handles", "Handles hold and move their parts while the rest is stylized"),
+)
+
+
+# object.arapfields: the settings, handles and results of one object.
 
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # library overrides keep it, so that they can be carried
 
@@ -53,7 +106,8 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
     )
     keep_rest: flag(
         "Keep the Rest",
-        "While all handles are pins, what is far from all but the anchors holds its place",
+        "As in files made before Locality: while all handles are pins, what is far from all but the "
+        "anchors holds its place",
     )
     keep_beyond: number(
         "Keep Beyond",
@@ -123,9 +177,6 @@ class ARAPFIELDS_PG_object(bpy.types.PropertyGroup):
         return settings_of(source) if source is not None else self
 
 
-CLASSES = [ARAPFIELDS_PG_result, ARAPFIELDS_PG_object]
-
-
 def attach():
     setattr(bpy.types.Bone, BONE_NUMBER, bpy.props.IntProperty(name="ARAP Fields", options={"HIDDEN"}))
     ours = bpy.props.PointerProperty(type=ARAPFIELDS_PG_object, name="ARAP Fields", override=OVERRIDABLE)
@@ -141,3 +192,12 @@ def detach():
             delattr(owner, PROPERTY)
     if hasattr(bpy.types.Bone, BONE_NUMBER):
         delattr(bpy.types.Bone, BONE_NUMBER)
+
+
+CLASSES = [
+    ARAPFIELDS_PG_fit,
+    ARAPFIELDS_PG_deform,
+    ARAPFIELDS_PG_stylize,
+    ARAPFIELDS_PG_result,
+    ARAPFIELDS_PG_object,
+]

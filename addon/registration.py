@@ -11,10 +11,10 @@ from .blender import host, source_operator
 
 CONTENTS = [  # modules with CLASSES
     # what is stored in the .blend: object.arapfields
-    *("handles.properties", "properties.records", "pin_tool.properties", "live.properties"),
+    *("handles.properties", "properties.choices", "pin_tool.properties", "live.properties"),
     *("stiffness.properties", "animation.properties", "wrap.properties", "skin.properties"),
     "contact.properties",
-    *("properties.solve_settings", "object_properties"),
+    "object_properties",
     # features
     *("tasks.panel", "surface.operators"),
     *("handles.operators", "handles.resizing", "handles.left_behind", "handles.panel"),
@@ -22,9 +22,9 @@ CONTENTS = [  # modules with CLASSES
     *("stylize.operators", "stylize.panel"),
     *("wrap.operators", "wrap.landmark_tools", "wrap.refitting", "wrap.sheet", "wrap.panel"),
     *("skin.operators", "carried.operators", "poses.operators", "stiffness.operators"),
-    *("contact.operators", "contact.panel"),
+    "contact.operators",
     *("live.operators", "live.panel", "pin_tool.operators"),
-    *("animation.operators", "animation.exporters", "animation.splat_export", "animation.panel"),
+    *("animation.operators", "animation.exporters", "animation.splat_export"),
     *("results.operators", "results.panel", "jobs.operators", "jobs.panel"),
     *("menus", "preferences"),
 ]

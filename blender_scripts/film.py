@@ -8,7 +8,6 @@ Writes FOLDER/NNN.png and film.json, with the cursor's position and button in ea
 import json
 
 import bpy
-import mouse
 import numpy as np
 import stage
 from mathutils import Euler
@@ -86,30 +85,30 @@ def checks(path, figures, folder):
     yield 0.5
     film.take(spot, hold=4)
     for number, where in enumerate(FEET, 1):
-        goal = mouse.pixel(where)
+        goal = stage.pixel(where)
         yield from glide(film, spot, goal)
         stage.tool("keydown", "shift")
         yield 0.2
         stage.tool("click", 1)
-        yield from mouse.until(lambda count=number: len(dinosaur.arapfields.handles) == count, 8.0)
+        yield from stage.until(lambda count=number: len(dinosaur.arapfields.handles) == count, 8.0)
         stage.tool("keyup", "shift")
         yield 0.4
         film.take(goal, pressed=True, hold=3)
         spot = goal
     for where, by in DRAGS:
         now = scenes.world_points(dinosaur)[np.linalg.norm(rest - where, axis=1).argmin()]
-        goal = mouse.pixel(now)
+        goal = stage.pixel(now)
         yield from glide(film, spot, goal)
         stage.tool("mousedown", 1)
-        yield from mouse.until(mouse.is_dragging, 5.0)
+        yield from stage.until(stage.is_dragging, 5.0)
         for step in range(1, STEPS + 1):
             spot = [round(a + step / STEPS * b) for a, b in zip(goal, by, strict=True)]
             stage.tool("mousemove", *spot)
             yield 0.15
-            yield from mouse.until(mouse.is_followed)
+            yield from stage.until(stage.is_followed)
             yield 0.25
             film.take(spot, pressed=True, hold=3 if step == STEPS else 1)
-        yield from mouse.release()
+        yield from stage.release()
         yield 0.3
     film.take(spot, hold=10)
     figures["pins"] = [[entry.empty.name, entry.anchor] for entry in dinosaur.arapfields.handles]

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 import arapfields as af
-from arapfields.cli.contact_sheet import png
+from arapfields.cli.wrapping import png
 
 FOLDER = Path(__file__).resolve().parents[1] / "addon" / "icons"
 SIZE, FINER = 64, 4

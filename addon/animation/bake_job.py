@@ -8,8 +8,7 @@ from ..blender.language import about, translated
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import effective_value, flag
 from ..core.errors import UserError
-from ..core.runtime.coroutines import Pause
-from ..core.runtime.jobs import Item, JobCancelled
+from ..core.runtime.jobs import Item, JobCancelled, Pause
 from ..field_modifier import layers
 from ..handles import empties
 from ..jobs.job_operator import JobOperator, with_progress

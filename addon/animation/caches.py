@@ -18,7 +18,7 @@ from ..blender.point_data import points_of
 from ..carried import played_points
 from ..core.errors import UserError, as_user_error
 from ..core.runtime import native
-from ..core.runtime.coroutines import Pause
+from ..core.runtime.jobs import Pause
 from ..field_modifier import cache_modifier, inputs
 from ..results import result_objects
 

@@ -28,7 +28,7 @@ from ..carried.points import (
 )
 from ..carried.transforms import BAKED_GROUP, BonesCarrier, PoseCarrier, TransformCarrier, forget_baked
 from ..core.errors import UserError, as_user_error
-from ..core.runtime.coroutines import Pause
+from ..core.runtime.jobs import Pause
 from ..field_modifier import cache_modifier
 from ..results import result_objects, visibility
 from .caches import CacheFile, plain

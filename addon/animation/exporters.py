@@ -20,8 +20,7 @@ from ..blender.property_definitions import choice, path_text, text
 from ..blender.splat_layouts import holds_splats
 from ..core import file_checks
 from ..core.errors import UserError
-from ..core.runtime.coroutines import Pause
-from ..core.runtime.jobs import Item
+from ..core.runtime.jobs import Item, Pause
 from ..core.settings.choices import EXPORT_FORMATS
 from ..field_modifier import cache_modifier
 from ..names import CONTEXT, Op

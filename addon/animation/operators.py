@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators of the animation panel."""
+"""The animation panel and its operators."""
 
 import bpy
 
 from ..blender import modifier_stack
 from ..blender.language import about, translated
 from ..blender.object_references import owner_of, settings_of, source_of
+from ..blender.point_data import points_of
 from ..blender.property_definitions import effective_value, path_text
+from ..blender.section import Section, draw_settings, job_button, modifier_row, note, wrapped
 from ..blender.source_operator import SourceOperator
 from ..blender.splat_layouts import holds_splats
 from ..carried import carrying, refusals
@@ -17,14 +19,17 @@ from ..core.errors import UserError, refuse
 from ..field_modifier import cache_modifier, inputs
 from ..field_nodes import helper, node_group
 from ..live import sessions
-from ..names import FIELD_NODES
+from ..names import FIELD_NODES, Op
 from ..poses import applying
+from ..solver import frame_range
 from . import caches, carried_bake, splat_export
 from .bake_job import BakeOperator, effective_kind, refusal_of
 from .object_bake import ObjectBake
 from .properties import folder, settings
 from .splat_export import SplatBake
 from .wrap_bake import WrapBake, frames_of, scans_in
+
+# Operators of the animation panel.
 
 
 def cached_with(source):
@@ -256,9 +261,50 @@ def is_following(modifier, carrier):
     )
 
 
+class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
+    bl_label = "Bake and Export"
+    bl_order = 10
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def fill(self, context, source, settings):
+        layout, bake = self.layout, settings.bake
+        is_scan = holds_splats(source)
+        draw_settings(layout, bake, "splat_format" if is_scan else "format", "kind", "range")
+        if bake.range == "CUSTOM":
+            column = layout.column(align=True)
+            column.prop(bake, "start")
+            column.prop(bake, "end")
+        loops = ["loop"] if settings.secondary.use else []
+        folders = ["folder"] if is_scan or bake.format != "KEYS" else []
+        draw_settings(layout, bake, "step", "subframes", *loops, *folders)
+        if not is_scan:
+            wrapped(layout, weight(context, source, bake))
+        job_button(layout, Op.BAKE, "REC")
+        if is_scan:
+            layout.operator(Op.EXPORT_SPLATS, icon="EXPORT")
+            return
+        modifier = modifier_stack.find_cache(source)
+        if modifier is not None:
+            modifier_row(layout, modifier, "MOD_MESHDEFORM", Op.REMOVE_BAKE)
+            layout.prop(modifier, "filepath", text="")
+            note(layout, caches.problem(source))
+        layout.menu("ARAPFIELDS_MT_export", icon="EXPORT")
+
+
+def weight(context, source, bake):
+    """Text with the estimated size of the frames."""
+    first, last = (bake.start, bake.end) if bake.range == "CUSTOM" else frame_range.scene_range(context.scene)
+    count = max(0, (last - first) * bake.subframes // bake.step + 1)
+    size = caches.size_text(caches.keys_weight(len(points_of(source.data)), count - 1))
+    if bake.range == "HANDLES":
+        return translated("{size} for the scene's frames", size=size)
+    return translated("{count} samples, {size}", count=count, size=size)
+
+
 CLASSES = [
     ARAPFIELDS_OT_bake,
     ARAPFIELDS_OT_wrap_sequence,
     ARAPFIELDS_OT_remove_bake,
     ARAPFIELDS_OT_field_as_nodes,
+    ARAPFIELDS_PT_animation,
 ]

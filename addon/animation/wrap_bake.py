@@ -35,7 +35,7 @@ def scans_in(collection, scene, sources, values):
     numbered from the scene's first frame. `values` may limit the frames by `start` and `end`.
     """
     native.library()
-    from arapfields.cli.wrap_sequence import by_numbers
+    from arapfields.cli.wrapping import by_numbers
 
     meshes = [one for one in collection.all_objects if one.type == "MESH" and one not in sources]
     meshes = [mesh for mesh in meshes if owner_of(mesh) not in sources]
@@ -132,8 +132,7 @@ class WrapBake(ObjectBake):
             return error
 
     def prepare(self):
-        from arapfields.cli.frames import folder_beside
-        from arapfields.cli.wrap_frames import HeldFrames, WrappedFrames
+        from arapfields.cli.frames import HeldFrames, WrappedFrames, folder_beside
 
         setup = sampled(self.reader.setup, self.values["samples"], self.values["seed"])
         options = options_of("wrap", self.values)

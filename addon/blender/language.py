@@ -65,7 +65,7 @@ def translations():
 def load():
     try:
         texts = translations()
-    except ModuleNotFoundError:  # source code without wheels: install_check reports it
+    except ModuleNotFoundError:  # source code without wheels: first_run reports it
         print("ARAP Fields: polib is missing, so all texts are in English", file=sys.stderr, flush=True)
         texts = {}
     bpy.app.translations.register(PACKAGE, texts)

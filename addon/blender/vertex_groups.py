@@ -6,7 +6,7 @@ import numpy as np
 from mathutils.kdtree import KDTree
 
 from ..core.errors import UserError, refuse
-from ..core.runtime.coroutines import Pause
+from ..core.runtime.jobs import Pause
 from . import modifier_stack
 from .object_references import ObjectReference
 

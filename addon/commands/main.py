@@ -9,9 +9,7 @@ import sys
 
 from ..core.errors import UserError, as_user_error
 from ..core.runtime import native
-from ..core.runtime.streams import open_streams
 from .children import Launch, end_with_parent
-from .parser import parse
 
 
 def run(arguments, script=None):
@@ -19,6 +17,18 @@ def run(arguments, script=None):
 
     `script` is the Python file that Blender was started with; None for a command of Blender's own.
     """
+    try:
+        native.library()
+    except UserError as error:
+        if arguments[:1] == ["check"]:  # whose report says why the library is missing
+            return verb("check")()
+        print(f"arapfields: {error}", file=sys.stderr, flush=True)
+        return 2
+    from arapfields._streams import open_streams
+    from arapfields.cli.command_line import failed
+
+    from .parser import parse
+
     open_streams()
     try:
         options = parse(arguments)
@@ -27,25 +37,18 @@ def run(arguments, script=None):
     with interruptible():
         end_with_parent()
         try:
-            if options.verb != "check":  # reports a library that is missing itself
-                native.library()
             return verb(options.verb)(options, Launch(script))
         except KeyboardInterrupt:
-            return fail("interrupted", 130)
+            return failed("arapfields", "interrupted", 130)
         except (UserError, OSError, ValueError) as error:
             full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
-            return fail(as_user_error(error), 1 if full else 2)
+            return failed("arapfields", as_user_error(error), 1 if full else 2)
 
 
 def verb(name):
     """The function of a verb; only verbs for one file import bpy."""
     module = name if name in ("batch", "check", "bake", "skin") else "single"
     return getattr(importlib.import_module(f".{module}", __package__), f"run_{module}")
-
-
-def fail(reason, code):
-    print(f"arapfields: {' '.join(str(reason).split())}", file=sys.stderr, flush=True)
-    return code
 
 
 @contextlib.contextmanager

@@ -4,8 +4,10 @@
 import argparse
 import math
 import re
-import sys
 from pathlib import Path, PurePath
+
+from arapfields.cli.command_line import parser_with_verbs
+from arapfields.cli.options import shard
 
 from ..core.settings.choices import (
     BAKE_FORMATS,
@@ -18,21 +20,6 @@ from ..core.settings.choices import (
     SURFACES,
 )
 from ..core.settings.parameters import DEFORM, EXTRACTION, QUALITIES, SKIN
-
-
-class OneLineParser(argparse.ArgumentParser):
-    """An ArgumentParser that prints errors in one line, with exit code 2, and names the verb's help."""
-
-    def error(self, message):
-        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
-        raise SystemExit(2)
-
-    def parse_known_args(self, args=None, namespace=None):
-        found, unknown = super().parse_known_args(args, namespace)
-        if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
-        return found, unknown
-
 
 # Flags of contact: obstacles, ground and self-contact.
 
@@ -62,7 +49,7 @@ def height(text):
     return value
 
 
-# The verbs with flags and help; the flags of solves are made from the tables of parameters.
+# The verbs.
 
 FORMATS = ("ply", "obj", "stl", "blend")
 PARAMETERS = {"deform": DEFORM, "stylize": STYLIZE}
@@ -105,12 +92,7 @@ def solve_settings(options):
 
 
 def parser():
-    root = OneLineParser(
-        prog="arapfields",
-        description="Deform and stylize meshes in a Blender without a window.",
-        epilog="Exit codes: 0 done, 1 something failed, 2 bad input or usage, 130 interrupted.",
-    )
-    verbs = root.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
+    root, verbs = parser_with_verbs("Deform and stylize meshes in a Blender without a window.")
     for name, text in (
         ("deform", "deform the meshes of one file under handles"),
         ("stylize", "turn the meshes of one file towards a style"),
@@ -259,12 +241,6 @@ def count(text):
     if not text.isdigit() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no number of at least 1")
     return int(text)
-
-
-def shard(text):
-    from arapfields.cli.options import shard as part
-
-    return part(text)
 
 
 def seconds(text):

@@ -1,27 +1,77 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""deform and stylize of one file, with an outcome for each of its objects."""
+"""deform and stylize of one file, with contact from flags and an outcome for each of its objects."""
 
-import contextlib
 import json
+import math
 import re
 import sys
-import threading
 import time
+from pathlib import Path
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
+from arapfields.cli.command_line import name_and_margin, shown_progress
+
 from ..blender.language import about
 from ..blender.object_references import is_source, settings_of
+from ..contact.properties import add
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
-from ..core.runtime.threads import start_thread
 from ..core.settings.choices import style_identifier
 from ..handles import empties, naming
 from ..names import REPORT
-from . import files, parser, touching
+from . import files, parser
+from .files import READ
 from .parser import solve_settings
+
+# Obstacles and other contact settings from flags, in addition to the objects' own settings.
+
+
+def parts(text):
+    """(name, margin) of "name:margin"."""
+    name, margin = name_and_margin(text, lambda whole: whole in bpy.data.objects)
+    if not 0.0 <= margin < math.inf:
+        raise UserError(f"--obstacle: {text}: the margin is negative, or no number")
+    return name, margin
+
+
+def named(options):
+    """The names of the obstacles, which are not solved themselves."""
+    return {parts(text)[0] for text in getattr(options, "obstacle", None) or ()}
+
+
+def set_contact(sources, options):
+    """Applies the flags to the sources' contact settings; each obstacle file is read once."""
+    obstacles = [(found(name, options), margin) for name, margin in map(parts, options.obstacle or ())]
+    for source in sources:
+        group = settings_of(source).contact
+        for item, margin in obstacles:
+            add(source, item, margin)
+        if options.ground is not None:
+            group.use_ground, group.ground = True, options.ground
+        if options.itself is not None:
+            group.itself = options.itself
+        group.use |= bool(obstacles) or options.ground is not None or bool(options.itself)
+
+
+def found(name, options):
+    """The object of that name, or the mesh of the file."""
+    item, path = bpy.data.objects.get(name), Path(name)
+    if item is None:
+        if path.suffix.lower() not in READ or not path.is_file():
+            raise UserError(f"--obstacle: {name}: no object of {options.input}, and no mesh file")
+        before = set(bpy.data.objects)
+        READ[path.suffix.lower()](str(path))
+        item = next(iter(set(bpy.data.objects) - before), None)
+        bpy.context.view_layer.update()
+    if item is None or item.type != "MESH":
+        raise UserError(f"--obstacle: {name}: is no mesh")
+    return item
+
+
+# deform and stylize of one file, with an outcome for each of its objects.
 
 CALLS = {"deform": bpy.ops.arapfields.deform, "stylize": bpy.ops.arapfields.stylize}
 # The operator's name, which Blender puts before a message.
@@ -41,7 +91,7 @@ def run_single(options, _):
     for place in (options.output, options.report):
         if place:
             files.check_place(place)
-    touching.set_contact(sources, options)
+    set_contact(sources, options)
     if options.handles:
         for source in sources:
             add_handles(source, options.handles)
@@ -65,7 +115,7 @@ def run_single(options, _):
 def objects_to_solve(options):
     """The objects to work on."""
     meshes = [item for item in bpy.context.view_layer.objects if is_source(item)]
-    obstacles = touching.named(options)
+    obstacles = named(options)
     meshes = [item for item in meshes if not settings_of(item).made_from and item.name not in obstacles]
     if options.objects:
         by_name = {item.name: item for item in meshes}
@@ -181,30 +231,6 @@ def write_json(path, content):
     write_text(path, json_text(content, indent=1))
 
 
-@contextlib.contextmanager
 def progress(quiet):
-    """Reports progress: a bar on a terminal, else a line now and then."""
-    ended = threading.Event()
-    live = sys.stderr.isatty()
-
-    def draw():
-        while not ended.wait(0.2 if live else 15.0):
-            share, text = jobs.progress()
-            if live:
-                print(
-                    f"\r[{'#' * round(24 * share):24}] {share:4.0%} {text[:60]:60}", end="", file=sys.stderr
-                )
-            else:
-                print(f"{share:4.0%} {text}", file=sys.stderr, flush=True)
-
-    if quiet:
-        yield
-        return
-    thread = start_thread("progress", draw)
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
-        if live:
-            print(f"\r{'':96}\r", end="", file=sys.stderr, flush=True)
+    """Context manager that reports progress: a bar on a terminal, else a line now and then."""
+    return shown_progress(jobs.progress, quiet=quiet, apart=15.0)

@@ -3,7 +3,10 @@
 
 import bpy
 
+from ..blender.object_references import settings_of
 from ..blender.property_definitions import collection, flag, integer, number, pointer
+
+# object.arapfields.contact: obstacles, ground and self-contact.
 
 
 class ARAPFIELDS_PG_obstacle(bpy.types.PropertyGroup):
@@ -36,4 +39,21 @@ class ARAPFIELDS_PG_contact(bpy.types.PropertyGroup):
     )
 
 
-CLASSES = [ARAPFIELDS_PG_obstacle, ARAPFIELDS_PG_contact]
+# Adds entries to a source's list of obstacles.
+
+
+def add(source, item, margin=0.0):
+    """Adds an object, or with None an empty row, to a source's list; returns the entry."""
+    group = settings_of(source).contact
+    entry = group.obstacle_list.add()
+    group.active_obstacle = len(group.obstacle_list) - 1
+    entry.margin = margin
+    if item is not None:
+        entry.name, entry.item = item.name, item
+    return entry
+
+
+CLASSES = [
+    ARAPFIELDS_PG_obstacle,
+    ARAPFIELDS_PG_contact,
+]

@@ -14,11 +14,11 @@ from ..blender.selection import choose_row
 from ..core.errors import UserError, refuse
 from ..core.geometry.handles import far_handle, solve_handle
 from ..core.geometry.spaces import Space, inverse, space_of, transform
-from ..core.runtime.coroutines import run_to_completion
+from ..core.runtime.jobs import run_to_completion
 from ..names import HANDLES, HANDLES_MARK
 from . import movers, naming, symmetry
 from .movers import box_now, current_box, has_mover, matrix_of, name_of
-from .palette import free_colour
+from .naming import free_colour
 
 
 def rest_box(source, entry, where=matrix_of):
@@ -112,12 +112,15 @@ def solve_handles(source, space, weights=None, where=matrix_of, rendered=None):
 def kept_rest(source):
     """(pin centers in the source's coordinates, distance): points farther from all centers stay in place.
 
-    No centers, and no such points, if there are handles other than pins, or only anchors. Distance 0 is the
-    rule of earlier files: half of the distance to the farthest point, if there is no anchor.
+    No centers, and no such points, where Locality keeps the rest, if there are handles other than pins, or
+    only anchors. Distance 0 is the rule of earlier files: half of the distance to the farthest point, if
+    there is no anchor.
     """
     settings, entries = settings_of(source), used(source)
     pins = all(entry.kind in PINS for entry in entries)
-    if settings.keep_rest and pins:
+    lacks_locality = settings.contact.use or settings.secondary.use
+    instead = lacks_locality and settings.deform.locality > 0 and settings.keep_beyond > 0
+    if pins and (settings.keep_rest or instead):
         moving = [tuple(movers.rest_of(e)[:3, 3]) for e in entries if not e.anchor]
         return tuple(moving), settings.keep_beyond
     if settings.hold_far and pins and not any(e.anchor for e in entries):

@@ -14,7 +14,7 @@ from ..blender.point_data import points_of
 from ..core.errors import UserError
 from ..core.geometry.handles import Handle
 from ..core.runtime import native
-from ..core.runtime.coroutines import Pause, run_to_completion, step_for
+from ..core.runtime.jobs import Pause, run_to_completion, step_for
 from ..core.runtime.threads import start_thread
 from ..field_modifier import layers
 from . import empties, movers, subdivided

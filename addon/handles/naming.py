@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names of handles, by the vertex group that they hold, such as "head", else "Handle 3"."""
+"""Names and colours of handles."""
 
 import re
 
@@ -10,6 +10,8 @@ from ..blender import mesh_arrays, modifier_stack
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
+
+# Names of handles, by the vertex group that they hold, such as "head", else "Handle 3".
 
 RIG_PREFIX = re.compile(r"^(DEF|ORG|MCH)-")  # prefixes of bones in generated rigs
 BLENDERS_OWN = re.compile(r"(\.\d{3,})?$")  # suffix that Blender appends to a used name
@@ -63,3 +65,23 @@ def is_blenders_own(empty):
     """Whether Blender named an Empty, rather than the user."""
     plain = BLENDERS_OWN.sub("", empty.name)
     return plain in ("Empty", bpy.app.translations.pgettext_data("Empty"))
+
+
+# Colours of handles: distinct from each other, from a grey viewport and from Blender's selection orange.
+
+PALETTE = [
+    *((0.27, 0.55, 1.0), (1.0, 0.42, 0.30), (0.35, 0.80, 0.40), (0.85, 0.45, 0.90), (1.0, 0.80, 0.25)),
+    *((0.62, 0.92, 1.0), (0.55, 0.10, 1.0), (0.77, 0.18, 0.48), (0.62, 1.0, 0.10), (1.0, 0.70, 0.92)),
+    *((0.48, 0.48, 0.25), (0.10, 0.77, 0.85), (0.10, 0.62, 0.10), (0.70, 0.62, 0.18), (0.48, 0.40, 0.62)),
+    *((0.10, 1.0, 0.77), (1.0, 0.10, 0.70), (0.10, 0.55, 0.62)),
+]
+
+
+def free_colour(handles):
+    """The colour that the fewest of these handles have."""
+    counts = [sum(is_colour(entry.colour, colour) for entry in handles) for colour in PALETTE]
+    return PALETTE[counts.index(min(counts))]
+
+
+def is_colour(one, other):
+    return max(abs(a - b) for a, b in zip(one, other, strict=True)) < 1e-3

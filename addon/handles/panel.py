@@ -100,7 +100,7 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
             hint = translated("Drag the shape with the pin tool, or press + for a pin or a box")
             wrapped(layout, hint, icon="INFO")
             return
-        if all(entry.kind in empties.PINS for entry in settings.handles):
+        if settings.keep_rest:  # of an older file; Locality does without
             switched(layout, settings, "keep_rest", "keep_beyond")
         layout.operator(Op.RESET_HANDLE, icon="LOOP_BACK")
         layout.operator(Op.SET_REST, icon="PINNED")

@@ -7,7 +7,7 @@ import bpy
 
 from ..blender import host, user_preferences
 from ..blender.host import redraw
-from ..core.runtime.redraw_throttle import RedrawThrottle
+from ..core.runtime.jobs import RedrawThrottle
 
 TICK = 0.03  # seconds between timer events
 

@@ -10,8 +10,7 @@ from ..blender.property_definitions import choice
 from ..blender.source_operator import Guided
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
-from ..core.runtime.coroutines import Pause, run_to_completion
-from ..core.runtime.jobs import JobCancelled
+from ..core.runtime.jobs import JobCancelled, Pause, run_to_completion
 from ..core.settings.choices import SCOPES
 from .modal import ModalRun
 

@@ -8,7 +8,7 @@ from ..blender.language import translated
 from ..blender.object_references import SceneReference
 from ..core.errors import UserError
 from ..core.runtime import jobs
-from ..core.runtime.coroutines import step_for
+from ..core.runtime.jobs import step_for
 from .display import display
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A live shape on the source itself: its field modifier moves, nothing is added or hidden."""
+"""What shows a live shape: the source's field modifier, or an object of its own."""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -7,9 +9,12 @@ from ..blender import modifier_stack
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
 from ..field_modifier import armatures, cache_modifier, motion
+from ..field_modifier.layers import Way
 from ..results import placement, visibility
 from . import stored
-from .live_object import LIVE
+from .live_object import LIVE, LiveObject
+
+# A live shape on the source itself: its field modifier moves, nothing is added or hidden.
 
 
 class LiveModifier:
@@ -24,11 +29,11 @@ class LiveModifier:
         self.was_silent = bool(settings_of(source).silenced)
         self.was_playing = cache_modifier.is_playing(source)
         self.bind(context, source)
+        visibility.show_alone(source, source, for_now=True)
 
     def bind(self, context, source):
         """Binds the modifier, also after an edit of the source; `before` stays as it is."""
         motion.bind(context, source, live=True)
-        visibility.show_alone(source, source, for_now=True)
 
     def is_there(self):
         return True
@@ -63,8 +68,7 @@ class LiveModifier:
             if source.mode != "EDIT":
                 motion.restore(source, self.before)
                 motion.drop_empty_helper(source)
-                if self.before is not None:
-                    settings_of(source).moved_by = self.moved_by
+                settings_of(source).moved_by = self.moved_by
                 if not self.was_silent:
                     armatures.restore(source)
                 if self.was_playing:
@@ -93,3 +97,27 @@ class LiveModifier:
 
 
 PAUSING = ("EDIT", "SCULPT")  # modes in which the user changes the mesh
+
+
+# The display of a live session: the source's field modifier, or an object of its own.
+
+
+class Former(NamedTuple):
+    """What a session that has ended hands over to the one that replaces it."""
+
+    uid: int  # session_uid of its source
+    display: Any
+    carried: dict  # what carried objects had before
+    keeps_shape: bool
+    way: Way  # what layers.make_way() has changed
+
+
+def display_of(context, source, surface, earlier):
+    """The display of a new session: the earlier session's if both are in the same place, else a new one."""
+    display = earlier.display if earlier else None
+    if display is not None and display.in_place == surface.in_place:
+        display.bind(context, source)
+        return display
+    if display is not None:
+        display.take_away(source)
+    return (LiveModifier if surface.in_place else LiveObject)(context, source, surface)

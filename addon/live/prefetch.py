@@ -49,10 +49,6 @@ class SolverPrefetch:
         except (ValueError, UserError):  # the session's own setup reports it
             self._solver = None
 
-    def is_ready(self):
-        """Whether a solver is set up."""
-        return self._solver is not None
-
     def take(self, setup):
         """Hands over the FrameSolver if its surface and energy fit the setup, whatever its handles and
         masses; else None. On a worker."""

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One source that is live: its requests, the worker that solves them, and where the shape is shown."""
 
-import contextlib
 import itertools
 import time
 from collections import deque
@@ -12,7 +11,7 @@ import bpy
 from ..blender.host import has_window, redraw
 from ..blender.object_references import settings_of
 from ..core.errors import UserError
-from ..core.runtime.coroutines import run_to_completion, step_for
+from ..core.runtime.jobs import run_to_completion, step_for
 from ..core.runtime.threads import REST, LatestRequestWorker
 from ..field_modifier import layers, unseen
 from ..results import placement, visibility
@@ -22,9 +21,8 @@ from ..solver.frame_solver import Shape
 from ..solver.request import Request
 from ..solver.source_reader import SourceChanged, SourceReader
 from . import stored
-from .display import Former, display_of
 from .edits import EditWatch, differ_in_handles, layout_of
-from .live_modifier import PAUSING
+from .live_modifier import PAUSING, Former, display_of
 from .live_solver import PACE, LiveSolver
 from .playback import Playback, scene_frame
 
@@ -84,7 +82,7 @@ class Session:
         return self.reader.carrying
 
     def _start(self, context):
-        """Coroutine (core/coroutines.py) that reads the vertex groups, then starts the worker."""
+        """Coroutine (core/runtime/jobs.py) that reads the vertex groups, then starts the worker."""
         yield from self.reader.read_setup(context)
         has_motion = secondary_motion.is_used(self.source.get())
         self.worker = LatestRequestWorker(
@@ -96,9 +94,10 @@ class Session:
         )
 
     def advance(self):
-        """Continues to read for a moment; True once the worker is started."""
+        """Continues to read for a moment, to the end where a shape is to be held, which is said before the
+        step of undo; True once the worker is started."""
         if self.worker is None:
-            step_for(self._reading)
+            (run_to_completion if self.is_held else step_for)(self._reading)
         return self.worker is not None
 
     def wait(self, seconds, refined):
@@ -190,7 +189,11 @@ class Session:
             return stored.mark(source) != stored.UNSETTLED
         if self.is_restored:
             return False
-        return stored.mark(source) == stored.wanted(source, self.digest(self.reader.request(context)))
+        try:
+            now = self.digest(self.reader.request(context))
+        except SourceChanged:
+            return False
+        return stored.mark(source) == stored.wanted(source, now)
 
     def keep_shown(self):
         """With `keeps_shape`, makes the shape on display the one that stays when live mode ends."""
@@ -270,11 +273,6 @@ class Session:
         if self.has_motion:
             self.playback.wait(self.requested, PATIENCE)
         self.show()
-
-    def show_last(self):
-        """Shows the last shape of a worker that has ended; its errors are ignored."""
-        with contextlib.suppress(UserError, ReferenceError):
-            self.show()
 
     def take_away(self, source):
         """Restores the state from before live mode; `source` is None if it was deleted."""

@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live mode: shapes follow handles and a style's sliders; its end restores the earlier state.
-
-A tool or script makes an object live with begin(context, source), has it show the newest shape with
-update(context) (in a window a timer does), and ends it with end(context, source, keep).
-"""
+"""The window's scene and its frame. Each scene has a depsgraph of its own, and Blender copies evaluated
+transforms to the original objects only from the active one: after a switch they are still those of the scene
+before, and after a jump to a frame, until the window evaluates it, those of the frame before."""
 
 import contextlib
 
 import bpy
 
 from ..blender import host, modifier_stack, property_definitions, undo_steps
+from ..blender.evaluation import depsgraph_of, updated
 from ..blender.host import redraw
 from ..blender.language import about
 from ..blender.object_references import in_scene, settings_of
@@ -17,11 +16,39 @@ from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..field_modifier import layers
 from ..results import placement
+from ..solver.frame_range import involved
 from ..solver.source_reader import SourceChanged, uses_handles
 from .edits import Updates
+from .playback import scene_frame
 from .session import Session
-from .shown_scene import ShownScene
 from .stored import Kept
+
+
+class ShownScene:
+    """`uid`: session_uid of the scene at the last check; None before the first one."""
+
+    uid = None
+
+    def follow(self, context, sessions):
+        """After a switch of scenes, tags and evaluates the objects that live shapes follow; evaluates a frame
+        that the scene was set to, if the window has not done so yet."""
+        before, self.uid = self.uid, context.scene.session_uid
+        if before in (None, self.uid):
+            if sessions and scene_frame(depsgraph_of(context).scene_eval) != scene_frame(context.scene):
+                updated(context.view_layer)
+            return
+        for session in sessions:
+            source = session.source.find()
+            for item in () if source is None else involved(source, session.kind):
+                item.update_tag(refresh={"TIME"} if isinstance(item, bpy.types.Object) else set())
+            session.edits.may_have_moved = session.reader.moves_by_itself
+        updated(context.view_layer)
+
+
+# Live mode: shapes follow handles and a style's sliders; its end restores the earlier state.
+#
+# A tool or script makes an object live with begin(context, source), has it show the newest shape with
+# update(context) (in a window a timer does), and ends it with end(context, source, keep).
 
 INTERVAL = 1 / 60  # seconds between calls of the timer
 WAIT = 30.0  # seconds at most that a script waits for the first shape

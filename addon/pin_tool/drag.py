@@ -26,7 +26,7 @@ class Snapshot:
         self.mark = stored.mark(source)
         self.is_settled = session is None or session.is_current(context)
         self.motion = motion.snapshot(source)
-        self.keep_rest, self.row = settings.keep_rest, settings.active_handle
+        self.row = settings.active_handle
         self.active = ObjectReference(layer.objects.active) if layer.objects.active else None
         self.selected = [ObjectReference(item) for item in context.selected_objects]
 
@@ -52,6 +52,8 @@ class Snapshot:
         if sessions.is_live(source):  # else it has ended with an error, shown in the panel
             sessions.live[source.session_uid].restored(is_held)
             sessions.update(context)
+            if is_held and sessions.is_live(source) and sessions.live[source.session_uid].is_held:
+                sessions.update(context)  # the solver has been set up anew
 
 
 class Drag:
@@ -125,8 +127,7 @@ class Drag:
             for name, value in self.values.items():
                 setattr(empty, name, value)
             pins.entry_of(empty).reach, pins.entry_of(empty).kind = self.reach, self.kind
-        settings = settings_of(source)
-        settings.keep_rest, settings.active_handle = self.before.keep_rest, self.before.row
+        settings_of(source).active_handle = self.before.row
         self.before.restore_selection(context)
         session = self.session()
         if session is not None and self.before.live:
@@ -189,6 +190,5 @@ def of_new_pin(context, source, location, radius, **further):
         return Drag(context, before, entry.empty, is_new=True)
     except Exception:
         pins.discard(source, entry.empty)
-        settings_of(source).keep_rest = before.keep_rest
         before.restore_selection(context)
         raise

@@ -21,7 +21,7 @@ from ..results import placement, visibility
 from . import places
 
 REACH_STEP = 1.1  # factor of a handle's reach per step of the mouse wheel
-KEPT = 0.3  # default distance beyond which points stay in place, as a share of the shape's size
+KEPT = 0.3  # distance from the pins beyond which points stay without Locality, as a share of the size
 MAJORITY = 0.5  # least mean weight of a vertex group that names a pin
 
 
@@ -101,13 +101,13 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
     error = refusal(source)
     if error is not None:
         raise error
-    settings, is_first = settings_of(source), not empties.used(source)
+    is_first = not empties.used(source)
     with layers.way_for_handle(context, source):
         place = places.find(context, source, location, radius, face, face_count)
     if face is not None and np.linalg.norm(place.now - location) > radius:
         warn_of_moves(source)
     if is_first:
-        settings.keep_rest, settings.keep_beyond = True, KEPT * place.size
+        settings_of(source).keep_beyond = KEPT * place.size
     now, rest = np.eye(4), np.eye(4)
     now[:3, :3], now[:3, 3], rest[:3, 3] = place.turn, place.now, place.rest
     empty = empties.make_empty(context, source, Matrix(now.tolist()), radius, name(source, place.weights))
@@ -187,7 +187,6 @@ def remove(context, source, empty):
         if with_empties:
             choose(context, with_empties[-1].empty)
         return
-    settings_of(source).hold_far = settings_of(source).keep_rest = False
     sessions.end(context, source)
     motion.remove(source)
     layers.uncover(source)

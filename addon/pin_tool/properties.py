@@ -5,7 +5,7 @@ import bpy
 
 from ..blender.property_definitions import choice, collection, flag, integer
 from ..core.settings.choices import TASKS
-from ..properties.records import ARAPFIELDS_PG_pose
+from ..properties.choices import ARAPFIELDS_PG_pose
 
 
 class ARAPFIELDS_PG_scene(bpy.types.PropertyGroup):

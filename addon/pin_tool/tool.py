@@ -59,7 +59,7 @@ class ARAPFIELDS_TOOL_pin(bpy.types.WorkSpaceTool):
             settings = settings_of(source)
             layout.prop(settings.deform, "symmetry")
             if settings.handles:
-                layout.prop(settings, "keep_rest")
+                layout.prop(settings.deform, "locality")
                 layout.prop(settings.contact, "use")
 
 

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Enum properties of an object's settings that an operator's arguments can override."""
+"""Enum properties that an operator's arguments can override; records of carried objects and of poses."""
 
 from functools import partial
 
-from ..blender.property_definitions import annotations, choice
+import bpy
+
+from ..blender.property_definitions import annotations, choice, pointer, text
 from ..core.settings.choices import (
+    CARRYING,
     CUSTOM,
     ORIENTATIONS,
     OUTPUTS,
@@ -15,6 +18,8 @@ from ..core.settings.choices import (
     style_identifier,
 )
 from ..core.settings.parameters import EXTRACTION, QUALITIES
+
+# Enum properties of an object's settings that an operator's arguments can override.
 
 QUALITY_ITEMS = tuple((key, label, tip) for key, (label, tip, _) in QUALITIES.items())
 STYLE_ITEMS = tuple(
@@ -57,3 +62,30 @@ def result_properties():
         "target": result(options={"SKIP_SAVE", "HIDDEN"}),  # the former name of `result`
         **extraction(**extra),
     }
+
+
+# Records of carried objects and of poses, stored in the file.
+
+BASE_KINDS = (
+    ("NONE", "None", "The field moves the object's points, or nothing yet"),
+    ("TRANSFORM", "Delta Transforms", "The field moves the object as a whole"),
+    ("BONES", "Bones", "The field poses the armature's bones"),
+)
+
+
+class ARAPFIELDS_PG_carried(bpy.types.PropertyGroup):
+    # `name`, which every PropertyGroup has, keeps the object's name for messages after its deletion
+    item: pointer(bpy.types.Object, "Object", "Moved by the field of the object that carries it")
+    way: choice(CARRYING, "Way", "How the object is carried")
+    base: text("Own Pose", "The object's own delta transforms or pose while the field moves it, as JSON")
+    base_kind: choice(BASE_KINDS, "Kind of Own Pose", "What the object's own pose consists of")
+
+
+class ARAPFIELDS_PG_pose(bpy.types.PropertyGroup):
+    data: text("Field", "The field, with samples of the shape that it was solved on")
+
+
+CLASSES = [
+    ARAPFIELDS_PG_carried,
+    ARAPFIELDS_PG_pose,
+]

@@ -10,14 +10,13 @@ from ..blender.property_definitions import annotations, choice, effective_value,
 from ..blender.section import Advanced, Section, draw_settings, job_button, note, settings_column
 from ..core.errors import UserError, refuse
 from ..core.runtime import native
-from ..core.runtime.coroutines import Pause
-from ..core.runtime.jobs import Item
+from ..core.runtime.jobs import Item, Pause
 from ..core.settings.choices import SKINNED
 from ..core.settings.parameters import SKIN
 from ..jobs.job_operator import JobOperator, busy
 from ..names import Op
 from . import rig as rigs
-from . import shapes, writing
+from . import writing
 from .properties import groups
 
 
@@ -62,11 +61,11 @@ class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
         kept_groups = effective_value("groups", settings, self)
         af, options = native.library(), options_of("skin", values)
         with rigs.at_rest(context, rig):
-            read = [shapes.read(context, item, rig, kept_groups) for item in meshes]
+            read = [writing.read(context, item, rig, kept_groups) for item in meshes]
         bones = rigs.bones_of(af, rig)
         names = [bone.name for bone in bones]
-        vertices, triangles, firsts = shapes.join(read)
-        painted = shapes.joined_stiffness(read)
+        vertices, triangles, firsts = writing.join(read)
+        painted = writing.joined_stiffness(read)
         reference, rest = ObjectReference(rig), rigs.rest_of(rig)
 
         def work(tracker):
@@ -81,7 +80,7 @@ class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
                 rows = slice(first, first + len(shape.vertices))
                 points = shape.own(shape.vertices)
                 own.append(
-                    shapes.fill_up(shape.own(weights[rows]), shape.kept, names, options.influences, points)
+                    writing.fill_up(shape.own(weights[rows]), shape.kept, names, options.influences, points)
                 )
                 if shape.nearest is None:
                     weights[rows] = own[-1]

@@ -57,7 +57,7 @@ class SourceReader:
             self.read_points(context, source)
 
     def read_setup(self, context):
-        """Coroutine (core/coroutines.py) that reads the vertex groups, and makes `setup`."""
+        """Coroutine (core/runtime/jobs.py) that reads the vertex groups, and makes `setup`."""
         source, in_place = self.reference.get(), self.surface.in_place
         if self.kind == "STYLIZE":
             held = style_settings.group_names(source, settings_of(source).stylize)

@@ -6,7 +6,7 @@ import numpy as np
 from ..blender import vertex_groups
 from ..blender.object_references import settings_of
 from ..core.errors import refuse
-from ..core.runtime.coroutines import run_to_completion
+from ..core.runtime.jobs import run_to_completion
 
 # {(identifier, label, tooltip): (factor of stretch stiffness, of bending stiffness)}
 PRESETS = {

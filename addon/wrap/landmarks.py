@@ -13,7 +13,7 @@ from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import facing, inverse, transform
 from ..field_modifier import layers
 from ..handles.empties import delete, make_empty, matrix_of
-from ..handles.palette import free_colour
+from ..handles.naming import free_colour
 from ..pin_tool import places
 from ..results import visibility
 

@@ -70,10 +70,10 @@ class ARAPFIELDS_OT_wrap_sheet(JobOperator, bpy.types.Operator):
 
         def work(tracker):
             native.library()
-            from arapfields.cli import contact_sheet
+            from arapfields.cli import wrapping
 
             tracker.start("Drawing", 1.0)
-            return contact_sheet.cell(name, figures, *meshes)
+            return wrapping.sheet_cell(name, figures, *meshes)
 
         def apply(cell):
             self.cells.append((off, cell))
@@ -85,10 +85,10 @@ class ARAPFIELDS_OT_wrap_sheet(JobOperator, bpy.types.Operator):
         result = yield from super().conclude(context, job)
         if self.cells:
             from arapfields._files import write_text
-            from arapfields.cli import contact_sheet
+            from arapfields.cli import wrapping
 
             path = Path(bpy.path.abspath(self.place()))
-            page = contact_sheet.page(cell for _, cell in sorted(self.cells, key=lambda one: -one[0]))
+            page = wrapping.sheet_page(cell for _, cell in sorted(self.cells, key=lambda one: -one[0]))
             try:
                 write_text(path, page)
             except (ValueError, OSError) as error:

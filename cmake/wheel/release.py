@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).resolve().parents[2] / "blender_scripts")]
 
-from extension.blender import extension_tool  # noqa: E402
+from build_extension import extension_tool  # noqa: E402
 from platforms import ROOT, run  # noqa: E402
 
 

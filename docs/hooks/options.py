@@ -71,7 +71,7 @@ def shown(file):
     tree = ast.parse((ADDON / f"{file}.py").read_text(encoding="utf-8"))
     drawn = "".join(
         path.read_text(encoding="utf-8")
-        for kind in ("panel", "tool", "preferences")
+        for kind in ("panel", "operators", "tool", "preferences")
         for path in ADDON.rglob(f"{kind}.py")
     )
     choices, names, rows = importlib.import_module("addon.core.settings.choices"), {}, {}

@@ -233,6 +233,44 @@ const std::vector<SurfaceSide>* NodeSight::kept(const TriangleMesh& mesh) const 
   return same ? &mesh_sides_ : nullptr;
 }
 
+namespace {
+
+/// Weights with which the excess at a place is blended from the company of its side: jets (company, 10) of
+/// normalised Gaussians about the nodes.
+void blend_weights(const Vec3& place, const Points& nodes, const std::vector<std::int32_t>& company,
+                   double width, int columns_count, std::vector<std::array<double, 10>>& weights) {
+  const double scale = 1.0 / (blend_widths * blend_widths * width * width);
+  weights.assign(company.size(), {});
+  double nearest = std::numeric_limits<double>::infinity(), sum = 0.0;
+  const auto square = [&](std::size_t m) {
+    return (nodes.row(company[m]).transpose() - place).squaredNorm();
+  };
+  for (std::size_t m = 0; m < company.size(); ++m) nearest = std::min(nearest, square(m));
+  for (std::size_t m = 0; m < company.size(); ++m)
+    sum += weights[m][0] = std::exp((nearest - square(m)) * scale);
+  Vec3 middle = Vec3::Zero();
+  for (std::size_t m = 0; m < company.size(); ++m) {
+    weights[m][0] /= sum;
+    middle += weights[m][0] * nodes.row(company[m]).transpose();
+  }
+  if (columns_count < 4) return;
+  // Of the logarithm of a weight the gradient is a, and the Hessian −Σ s a aᵀ over all, the same for each.
+  const auto slope = [&](std::size_t m) -> Vec3 {
+    return 2.0 * scale * (nodes.row(company[m]).transpose() - middle);
+  };
+  Mat3 spread = Mat3::Zero();
+  for (std::size_t m = 0; m < company.size(); ++m) spread += weights[m][0] * slope(m) * slope(m).transpose();
+  for (std::size_t m = 0; m < company.size(); ++m) {
+    const Vec3 a = slope(m);
+    const Mat3 bend = weights[m][0] * (a * a.transpose() - spread);
+    for (int i = 0; i < 3; ++i) weights[m][static_cast<std::size_t>(first_column(i))] = weights[m][0] * a[i];
+    for (int i = 0; i < 3; ++i)
+      for (int j = i; j < 3; ++j) weights[m][static_cast<std::size_t>(second_column(i, j))] = bend(i, j);
+  }
+}
+
+}  // namespace
+
 void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
                                  const std::vector<SurfaceSide>* sides) const {
   constexpr Index block = embedding_block;
@@ -247,8 +285,9 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
     std::array<double, 3 * block> packed;
     std::array<double, 30 * block> jets;
     std::vector<std::int32_t> near(n);
-    std::vector<double> distance(n), excess, shares;
-    std::vector<Index> slots(sight ? n : 0, -1);  // of the nodes among those that are near
+    std::vector<double> distance(n), excess;
+    std::vector<std::array<double, 10>> weights;
+    std::vector<Index> slots(sight ? n : 0, -1);  // of the hidden nodes among those that are near
     for (Index b = first; b < last; ++b) {
       const Index valid = std::min(block, count - b * block);
       const auto part = points.middleRows(b * block, valid);
@@ -263,47 +302,51 @@ void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
         nearest = std::min(nearest, distance[j]);
       }
       double farthest_nearest = nearest + radius;
-      bool hides = false;  // whether a point of the block does not see some node
       const auto side_of = [&](Index i) {
         return sight ? (*sides)[static_cast<std::size_t>(b * block + std::min(i, valid - 1))]
                      : SurfaceSide{-1};
       };
+      const auto for_hidden = [&](SurfaceSide node, const auto& visit) {
+        for (std::int32_t k = sight->starts[node]; k < sight->starts[node + 1]; ++k)
+          visit(sight->others[k], sight->excess[k]);
+      };
       for (Index i = 0; sight && i < valid; ++i)
         if (const SurfaceSide side = side_of(i); side >= 0) {
-          for (const std::int32_t node : sight->company(side))
-            hides = hides || sight->starts[node] < sight->starts[node + 1];
           farthest_nearest = std::max(farthest_nearest, (part.row(i) - nodes.row(side)).norm());
+          for (const std::int32_t node : sight->company(side))
+            for_hidden(node, [&](std::int32_t other, double) { slots[other] = 0; });
         }
       const double cutoff =
           std::sqrt(farthest_nearest * farthest_nearest - negligible * width * width) + radius;
       Index near_count = 0;
-      for (Index j = 0; j < n; ++j)
-        if (distance[j] <= cutoff) near[near_count++] = static_cast<std::int32_t>(j);
-      if (hides) {
-        excess.assign(static_cast<std::size_t>(near_count * block), 0.0);
-        for (Index a = 0; a < near_count; ++a) slots[near[a]] = a;
-        for (Index i = 0; i < block; ++i) {
-          const SurfaceSide side = side_of(i);
-          if (side < 0) continue;
-          const auto place = part.row(std::min(i, valid - 1));
-          const std::vector<std::int32_t>& company = sight->company(side);
-          shares.clear();
-          double sum = 0.0;
-          for (const std::int32_t node : company) {
-            const double share =
-                std::exp(-(place - nodes.row(node)).squaredNorm() * scale / (blend_widths * blend_widths));
-            shares.push_back(share);
-            sum += share;
-          }
-          for (std::size_t m = 0; m < company.size(); ++m)
-            for (std::int32_t k = sight->starts[company[m]]; k < sight->starts[company[m] + 1]; ++k)
-              if (const Index slot = slots[sight->others[k]]; slot >= 0)
-                excess[slot * block + i] += shares[m] / sum * sight->excess[k];
-        }
-        for (Index a = 0; a < near_count; ++a) slots[near[a]] = -1;
+      const auto add_near = [&](bool hidden) {
+        for (Index j = 0; j < n; ++j)
+          if (distance[j] <= cutoff && (sight && slots[j] >= 0) == hidden)
+            near[near_count++] = static_cast<std::int32_t>(j);
+      };
+      if (sight) add_near(true);
+      const Index hidden_count = near_count;
+      add_near(false);
+      if (sight) std::fill(slots.begin(), slots.end(), Index{-1});
+      for (Index a = 0; a < hidden_count; ++a) slots[near[a]] = a;
+      excess.assign(static_cast<std::size_t>(hidden_count * columns_count * block), 0.0);
+      for (Index i = 0; i < block && hidden_count > 0; ++i) {
+        const SurfaceSide side = side_of(i);
+        if (side < 0) continue;
+        const std::vector<std::int32_t>& company = sight->company(side);
+        blend_weights(part.row(std::min(i, valid - 1)).transpose(), nodes, company, width, columns_count,
+                      weights);
+        for (std::size_t m = 0; m < company.size(); ++m)
+          for_hidden(company[m], [&](std::int32_t other, double square) {
+            const Index slot = slots[other];
+            for (int c = 0; slot >= 0 && c < columns_count; ++c)
+              excess[(slot * columns_count + c) * block + i] +=
+                  weights[m][static_cast<std::size_t>(c)] * square;
+          });
       }
-      const EmbeddingBlock embedding_block_data{packed.data(), rows.data(), near.data(),
-                                                near_count,    scale,       hides ? excess.data() : nullptr};
+      for (Index a = 0; a < hidden_count; ++a) slots[near[a]] = -1;
+      const EmbeddingBlock embedding_block_data{packed.data(), rows.data(), near.data(),  near_count,
+                                                hidden_count,  scale,       excess.data()};
       ARAPFIELDS_DISPATCH(embedding_jets(embedding_block_data, columns_count, jets.data()));
       for (int c = 0; c < columns_count; ++c)
         for (Index p = 0; p < valid; ++p)

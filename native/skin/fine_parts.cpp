@@ -82,6 +82,7 @@ std::vector<std::pair<Index, std::vector<Index>>> groups_of(const RigShape& rig,
                                                             const SignedDistance& surface) {
   const Skeleton& skeleton = rig.skeleton;
   const std::vector<double> radii = radii_of(skeleton, surface, rig.extent);
+  for (Index b = 0; b < skeleton.count(); ++b) fprintf(stderr, "%s r/s %.3f pulls %d\n", skeleton.bone(b).name.c_str(), radii[b] / rig.spacing, (int)rig.pulls[b]);//DBG
   std::vector<Index> group(skeleton.count());
   std::iota(group.begin(), group.end(), Index{0});
   for (Index a = 0; a < skeleton.count(); ++a)
@@ -186,6 +187,7 @@ std::vector<FinePart> fine_parts(const RigShape& rig, const TriangleMesh& mesh,
       ends.row(2 * k + 1) = rig.skeleton.bone(thin[k]).tail.transpose();
     }
     const double size = diagonal_of(ends);
+    fprintf(stderr, "PART %s n %d size %.3f of %.3f\n", rig.skeleton.bone(hangs_on).name.c_str(), (int)thin.size(), size, rig.extent);//DBG
     if (size > largest_part * rig.extent) continue;
     if (pieces.empty()) pieces = welded.pieces(mesh);
     if (std::optional<FinePart> part = part_of(rig, hangs_on, thin, size, mesh, welded, pieces))

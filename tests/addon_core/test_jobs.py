@@ -10,9 +10,14 @@ import pytest
 
 from addon.core.errors import UserError
 from addon.core.runtime import jobs
-from addon.core.runtime.coroutines import Finished, Pause, run_to_completion, step_for
-from addon.core.runtime.jobs import ProgressTracker
-from addon.core.runtime.redraw_throttle import RedrawThrottle
+from addon.core.runtime.jobs import (
+    Finished,
+    Pause,
+    ProgressTracker,
+    RedrawThrottle,
+    run_to_completion,
+    step_for,
+)
 from addon.core.runtime.threads import (
     NICENESS,
     LatestRequestWorker,

@@ -40,7 +40,6 @@ TOP = {
     "lifecycle",
     "preferences",
     "first_run",
-    "install_check",
     "menus",
     "names",
     "object_properties",

@@ -15,8 +15,7 @@ import arapfields as af
 
 from . import shapes
 from .peer import registration, styles, theirs, weights, yardstick
-from .peer.problems import awkward, of_figures
-from .peer.theirs import Refused
+from .peer.theirs import Refused, awkward, of_figures
 
 # Of the processor, for each training of implicit-arap; 0 is its own settings. Its own 1,000 steps run to the
 # end, each with as many of its 1,000 patches on the surface and as many in space as the time allows.

@@ -26,7 +26,7 @@ if IN_BLENDER:
     from addon.blender import modifier_stack
     from addon.blender.actions import curves_of
     from addon.core.runtime import jobs
-    from addon.core.runtime.coroutines import Pause, run_to_completion
+    from addon.core.runtime.jobs import Pause, run_to_completion
     from addon.field_modifier import cache_modifier
     from addon.live import sessions
     from addon.solver.frame_range import animation_range

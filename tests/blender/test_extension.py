@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from support.blender import blenders
 from support.blender.inside import require_bpy
+from support.files.splats import splats
 from support.geometry import cases
-from support.geometry.scan import splats
 
 from arapfields.cli import splat_files
 

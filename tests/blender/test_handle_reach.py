@@ -22,7 +22,7 @@ if IN_BLENDER:
     from addon.handles import subdivided, symmetry
     from addon.live import sessions
     from addon.pin_tool import drag, drawing
-    from addon.pin_tool.modal import reach_steps
+    from addon.pin_tool.operators import reach_steps
     from addon.viewport.handle_boxes import CIRCLE_ENDS, box_lines, ghosts, segments
 
 pytestmark = pytest.mark.in_blender

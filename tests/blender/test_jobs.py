@@ -29,8 +29,7 @@ if IN_BLENDER:
     from addon.carried import operators as carried
     from addon.core.errors import UserError
     from addon.core.runtime import jobs, native
-    from addon.core.runtime.coroutines import Pause
-    from addon.core.runtime.jobs import JobCancelled
+    from addon.core.runtime.jobs import JobCancelled, Pause
     from addon.deform.operators import ARAPFIELDS_OT_deform
     from addon.field_modifier import inputs
     from addon.handles import empties, operators

@@ -24,7 +24,7 @@ if IN_BLENDER:
     from addon.blender import mesh_arrays, modifier_stack, undo_steps
     from addon.core.geometry import spaces
     from addon.core.runtime import jobs
-    from addon.core.runtime.coroutines import run_to_completion
+    from addon.core.runtime.jobs import run_to_completion
     from addon.field_modifier import inputs, motion
     from addon.live import recovery, sessions
     from addon.live.live_solver import LiveSolver

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
-from support.blender.stack_list import STACKS
+from support.blender.stacks import STACKS
 
 if IN_BLENDER:
     import bpy

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
 
+import arapfields as af
+
 if IN_BLENDER:
     import bpy
     from mathutils import Matrix
@@ -18,7 +20,7 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.field_modifier import motion
     from addon.handles import empties, left_behind
-    from addon.handles.palette import PALETTE, free_colour
+    from addon.handles.naming import PALETTE, free_colour
     from addon.live import sessions
     from addon.live.prefetch import prefetch
     from addon.pin_tool import drag, hints, hover, pins, places, screen
@@ -50,7 +52,6 @@ def test_without_anything_that_holds_the_shape_follows_as_a_whole(locality):
         bar.arapfields.deform.locality = locality
     rest = scenes.world_points(bar)
     empty = pin(bar, (1.0, 0.0, 0.25))
-    bar.arapfields.keep_rest = False
     way = 0.5 if locality == 0 else 4.0
     empty.location.z += way
     step(refined=True)
@@ -62,12 +63,41 @@ def test_a_pin_alone_takes_its_surroundings():
     bar = scenes.bar()
     rest = scenes.world_points(bar)
     empty = pin(bar, (1.0, 0.0, 0.25))
-    bar.arapfields.keep_rest = False
     empty.location.z += 0.1
     step(refined=True)
     moved = scenes.world_points(bar) - rest
     assert np.abs(moved[rest[:, 0] < -0.5]).max() < 0.01
     assert np.abs(moved[rest[:, 0] > 0.95][:, 2] - 0.1).max() < 0.05
+
+
+@pytest.mark.parametrize("part", ["contact", "secondary"])
+def test_without_locality_what_is_far_from_all_pins_holds(part):
+    """Also where it was switched on after a drag."""
+    bar = scenes.bar()
+    rest = scenes.world_points(bar)
+    empty = pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.35))
+    getattr(bar.arapfields, part).use = True
+    drag.of_entry(bpy.context, bar, bar.arapfields.handles[0]).end(bpy.context)
+    step()
+    empty.location.z += 0.9
+    step(refined=True)
+    assert np.abs(scenes.world_points(bar) - rest)[rest[:, 0] < -0.8].max() < 0.15
+
+
+def test_locality_at_its_strongest_keeps_the_rest():
+    """Where the default takes the whole along."""
+    ways = []
+    for locality in (af.DeformOptions().locality, 1.0):
+        bar = scenes.bar()
+        bar.arapfields.deform.locality = locality
+        rest = scenes.world_points(bar)
+        empty = pin(bar, (1.0, 0.0, 0.25))
+        empty.location.z += 1.0
+        step(refined=True)
+        far = rest[:, 0] < -0.5
+        ways.append(np.abs(scenes.world_points(bar) - rest)[far].max())
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+    assert ways[1] < 0.1 * ways[0], ways
 
 
 def test_a_press_without_a_move_changes_no_shape():
@@ -132,12 +162,20 @@ def test_the_last_pin_takes_the_motion_with_it():
     assert bpy.context.view_layer.objects.active == bar
 
 
+def keep_the_rest(bar, beyond=0.6):
+    """As in files of before Locality, of a bar with pins."""
+    bar.arapfields.deform.locality = 0.0
+    bar.arapfields.keep_rest, bar.arapfields.keep_beyond = True, beyond
+
+
 def lifted(hold_turn, keeps):
     """How far the middle of the bar went, and how its end turned (degrees): one end nailed, one lifted."""
     bar = scenes.bar()
     rest = scenes.world_points(bar)
+    bar.arapfields.deform.locality = 0.0
     pin(bar, (-0.95, 0.0, 0.25), anchor=True)
-    bar.arapfields.keep_rest = keeps
+    if keeps:
+        keep_the_rest(bar)
     pin(bar, (0.95, 0.0, 0.25), target=(0.6, 0.0, 0.9), kind="PIN" if hold_turn else "POINT")
     step(refined=True)
     shift = scenes.world_points(bar) - rest
@@ -148,7 +186,7 @@ def lifted(hold_turn, keeps):
     return middle, np.degrees(np.arccos((np.trace(turn) - 1) / 2))
 
 
-def test_a_pin_of_place_lets_turn_and_the_rest_is_kept():
+def test_a_pin_of_place_lets_turn_and_older_files_keep_the_rest():
     (loose, _), (kept, held), (_, hanging) = lifted(True, False), lifted(True, True), lifted(False, True)
     assert kept < 0.5 * loose and held < 0.5 * hanging, (loose, kept, held, hanging)
 
@@ -251,7 +289,7 @@ def test_the_shape_moves_with_the_pin_in_the_same_picture():
 
 
 def test_pins_that_leave_nothing_far_are_dragged_all_the_same():
-    """What keeps its place beyond all pins is no handle then."""
+    """What keeps its place beyond all pins in older files is no handle then."""
     bar = scenes.bar()
     for x in (0.9, -0.9):
         dragged = drag.of_new_pin(bpy.context, bar, np.array([x, -0.25, 0.0]), 0.1)
@@ -260,7 +298,8 @@ def test_pins_that_leave_nothing_far_are_dragged_all_the_same():
         assert sessions.is_live(bar)
         off = np.linalg.norm(scenes.world_points(bar) - (x, -0.25, 0.3), axis=1).min()
         assert off < 0.2, off
-        bar.arapfields.keep_beyond = 10.0
+        keep_the_rest(bar, beyond=10.0)
+        step()
 
 
 # The pin tool knows its object, the active one; others are pinned by Alt. A label says what a press does.

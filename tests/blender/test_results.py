@@ -17,7 +17,7 @@ if IN_BLENDER:
     import addon.deform.operators as deform
     from addon.core.errors import UserError
     from addon.core.runtime import jobs
-    from addon.core.runtime.coroutines import Pause, run_to_completion
+    from addon.core.runtime.jobs import Pause, run_to_completion
     from addon.properties.choices import RESULT_ITEMS
     from addon.results.placement import placement_refusal
 

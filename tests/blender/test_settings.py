@@ -237,19 +237,51 @@ def test_a_new_file_keeps_the_newest(tmp_path):
     assert reopened(tmp_path, former_defaults.NEWEST).deform.locality == pytest.approx(USUAL)
 
 
+def test_keep_the_rest_of_an_older_file_stays_until_its_handles_are_gone(tmp_path):
+    bar, *_ = scenes.bar_with_handles()
+    bar.arapfields.defaults, bar.arapfields.keep_rest, name = 0, True, bar.name
+    file = str(tmp_path / "bar.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    bar = bpy.data.objects[name]
+    assert bar.arapfields.keep_rest and bar.arapfields.deform.locality == 0.0
+    scenes.activate(bar)
+    for _ in range(len(bar.arapfields.handles)):
+        bpy.ops.arapfields.remove_handle(delete=True)
+    bpy.ops.arapfields.pin_add(location=(1, 0, 0.25), radius=0.2)
+    assert not bar.arapfields.keep_rest
+    assert bar.arapfields.deform.locality == pytest.approx(USUAL)
+
+
 def test_an_object_without_handles_has_the_newest():
     bar = scenes.bar()
     former_defaults.keep()
     assert bar.arapfields.deform.locality == pytest.approx(USUAL)
 
 
-def test_a_strength_of_an_older_file_keeps_its_weight(tmp_path):
-    """Once: what is saved after that stays. So does the whole strength."""
+def weight_of(bar):
+    """The share of the style's weight that an older file's strength stands for."""
+    growth = former_defaults.GROWTH
+    return (growth**bar.arapfields.stylize.strength - 1) / (growth - 1)
+
+
+def test_a_strength_of_an_older_file_is_converted(tmp_path):
+    """Once: what is saved after that stays. So does the whole strength. Keyframes go along, also of an action
+    that two objects share."""
     bars = {}
     for strength in (0.1, 0.5, 1.0):
         bar = scenes.bar()
         bar.arapfields.stylize.strength = strength
         bars[bar.name] = strength
+    keyed = [scenes.bar() for _ in range(2)]
+    for frame, share in ((1, 0.1), (11, 0.5)):
+        keyed[0].arapfields.stylize.strength = share
+        keyed[0].keyframe_insert("arapfields.stylize.strength", frame=frame)
+    keyed[1].arapfields.stylize.strength = share
+    keyed[1].animation_data_create().action = keyed[0].animation_data.action
+    if hasattr(keyed[1].animation_data, "action_slot"):
+        keyed[1].animation_data.action_slot = keyed[0].animation_data.action_slot
+    keyed = [bar.name for bar in keyed]
     file = str(tmp_path / "styled.blend")
     stamp, former_defaults.stamp = former_defaults.stamp, lambda: None  # the older extension had none
     try:
@@ -259,10 +291,11 @@ def test_a_strength_of_an_older_file_keeps_its_weight(tmp_path):
     for _ in range(2):
         bpy.ops.wm.open_mainfile(filepath=file)
         for name, share in bars.items():
-            strength = bpy.data.objects[name].arapfields.stylize.strength
-            growth = former_defaults.GROWTH
-            weight = (growth**strength - 1) / (growth - 1)
-            assert weight == pytest.approx(share, rel=1e-4)
+            assert weight_of(bpy.data.objects[name]) == pytest.approx(share, rel=1e-4)
+        for frame, share in ((1, 0.1), (11, 0.5)):
+            bpy.context.scene.frame_set(frame)
+            for name in keyed:
+                assert weight_of(bpy.data.objects[name]) == pytest.approx(share, rel=1e-4)
         bpy.ops.wm.save_as_mainfile(filepath=file)
 
 

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin weights and correctives of an armature."""
+"""Skin weights and correctives of an armature, and skinned files elsewhere."""
+
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +22,7 @@ if IN_BLENDER:
     from addon.names import CORRECTIVE
     from addon.skin.operators import ARAPFIELDS_OT_skin
 
-pytestmark = pytest.mark.in_blender
+# Skin weights and correctives of an armature.
 
 # Skin to Armature: groups, modifier, several meshes, correctives, what is kept, refusals, one undo.
 
@@ -32,6 +36,7 @@ def posed(rig, **turns):
     bpy.context.view_layer.update()
 
 
+@pytest.mark.in_blender
 def test_several_meshes_get_weights_and_a_modifier():
     body, rig = person()
     cloth, ball = shirt(body), eye()
@@ -58,6 +63,7 @@ def test_several_meshes_get_weights_and_a_modifier():
     assert np.allclose(scenes.world_points(body), after + np.eye(3)[0], atol=1e-5)
 
 
+@pytest.mark.in_blender
 def test_sides_are_alike_and_a_second_time_uses_the_modifier():
     body, rig = person()
     scenes.activate(body, rig)
@@ -72,6 +78,7 @@ def test_sides_are_alike_and_a_second_time_uses_the_modifier():
     assert paired.mean() > 0.9 and np.abs(weights[paired] - weights[twin[paired]][:, other]).max() < 1e-3
 
 
+@pytest.mark.in_blender
 def test_locked_groups_stay_and_others_are_kept_by_choice():
     body, rig = person()
     names = [bone.name for bone in rig.data.bones]
@@ -95,6 +102,7 @@ def test_locked_groups_stay_and_others_are_kept_by_choice():
     assert np.abs(weights_of(body, names) - weights).max() > 0.1
 
 
+@pytest.mark.in_blender
 def test_generated_vertices_and_a_scaled_turned_object():
     """A half that Mirror completes, and Subdivision after the armature."""
     body, rig = person(half=True)
@@ -110,6 +118,7 @@ def test_generated_vertices_and_a_scaled_turned_object():
     assert {group.name[-2:] for group in body.vertex_groups} == {"ne", ".L", ".R"}
 
 
+@pytest.mark.in_blender
 def test_correctives_are_keys_with_plain_drivers():
     body, rig = person()
     scenes.activate(body, rig)
@@ -132,6 +141,7 @@ def test_correctives_are_keys_with_plain_drivers():
     assert len(body.data.shape_keys.key_blocks) == 1
 
 
+@pytest.mark.in_blender
 def test_the_pose_at_hand_does_not_matter():
     body, rig = person()
     scenes.activate(body, rig)
@@ -143,6 +153,7 @@ def test_the_pose_at_hand_does_not_matter():
     assert rig.data.pose_position == "POSE" and np.allclose(weights_of(body, names), first, atol=1e-5)
 
 
+@pytest.mark.in_blender
 def test_control_bones_move_nothing_and_are_named():
     body, rig = person()
 
@@ -218,6 +229,7 @@ REFUSALS = {
 }
 
 
+@pytest.mark.in_blender
 @pytest.mark.parametrize("reason", REFUSALS)
 def test_refusals_name_the_reason_and_change_nothing(reason, tmp_path):
     body, rig = person()
@@ -258,6 +270,7 @@ def seen_of(body):
     }
 
 
+@pytest.mark.in_blender
 def test_all_settings_of_a_rig_beside_several_meshes_are_in_reach():
     body, rig = person()
     cloth = shirt(body)
@@ -271,6 +284,7 @@ def test_all_settings_of_a_rig_beside_several_meshes_are_in_reach():
     assert [name for name in drawn() if "_PT_" in name] == ["ARAPFIELDS_PT_source"]
 
 
+@pytest.mark.in_blender
 def test_undo_a_file_and_another_armature(tmp_path):
     """Undone, done again, saved and read; an armature and a group that were there stay as they were."""
     bpy.context.preferences.edit.use_global_undo = True
@@ -301,6 +315,7 @@ def test_undo_a_file_and_another_armature(tmp_path):
     assert [(bone.name, tuple(bone.head_local)) for bone in bpy.data.armatures["Rig.001"].bones] == bones
 
 
+@pytest.mark.in_blender
 @pytest.mark.parametrize("stage", ["Posing", "Weights", "Correctives"])
 def test_a_cancel_at_any_stage_changes_nothing(stage):
     for _ in range(ATTEMPTS):
@@ -327,6 +342,7 @@ def changed_meanwhile(change):
     return operator.said, before, seen_of(body)
 
 
+@pytest.mark.in_blender
 @pytest.mark.parametrize("change", ["removed", "renamed", "moved"])
 def test_bones_that_change_meanwhile_leave_the_meshes_as_they_are(change):
     def changed(_, rig):
@@ -339,6 +355,7 @@ def test_bones_that_change_meanwhile_leave_the_meshes_as_they_are(change):
     assert said == ["Rig changed while it was worked on; run again"] and now == before
 
 
+@pytest.mark.in_blender
 @pytest.mark.parametrize("which", ["body", "rig"])
 def test_what_moves_beside_the_armature_meanwhile_is_not_skinned(which):
     def moved(body, rig):
@@ -348,6 +365,7 @@ def test_what_moves_beside_the_armature_meanwhile_is_not_skinned(which):
     assert said == ["Body changed while it was worked on; run again"] and now == before
 
 
+@pytest.mark.in_blender
 def test_what_moves_with_the_armature_meanwhile_is_skinned():
     def both(body, rig):
         rig.pose.bones["Thigh.L"].rotation_quaternion = (0.9, 0.1, 0, 0)
@@ -358,6 +376,7 @@ def test_what_moves_with_the_armature_meanwhile_is_skinned():
     assert said[0].startswith("Rig: 5 bones move Body") and now != before
 
 
+@pytest.mark.in_blender
 def test_a_script_names_mesh_and_armature_by_an_override_of_the_context():
     body, rig = person()
     scenes.activate(scenes.bar())
@@ -366,6 +385,7 @@ def test_a_script_names_mesh_and_armature_by_an_override_of_the_context():
     assert body.vertex_groups and not bpy.context.object.vertex_groups
 
 
+@pytest.mark.in_blender
 @pytest.mark.parametrize("which", ["Body", "Rig"])
 def test_a_scale_that_flattens_is_named(which):
     scenes.activate(*person())
@@ -374,6 +394,7 @@ def test_a_scale_that_flattens_is_named(which):
         bpy.ops.arapfields.skin(scope="SELECTED", poses=8, samples=800)
 
 
+@pytest.mark.in_blender
 def test_a_linked_armature_poses_meshes_and_hidden_meshes_of_its_collection_too(tmp_path):
     body, rig = person()
     path = f"{tmp_path}/rig.blend"
@@ -393,6 +414,7 @@ def test_a_linked_armature_poses_meshes_and_hidden_meshes_of_its_collection_too(
     assert np.allclose(weights_of(other, list(body.vertex_groups.keys())).sum(axis=1), 1, atol=1e-5)
 
 
+@pytest.mark.in_blender
 def test_a_half_that_mirror_completes_follows_the_bones_of_its_own_side():
     """Mirror gives the other side the groups of its names, which are there though the half has none of it."""
     body, rig = person(half=True)
@@ -409,6 +431,7 @@ def test_a_half_that_mirror_completes_follows_the_bones_of_its_own_side():
     assert ways[1][~left].max() > 0.1 > 1e-3 > ways[1][left].max()
 
 
+@pytest.mark.in_blender
 @pytest.mark.parametrize("kind", ["empty", "locked"])
 def test_no_vertex_is_left_without_a_bone(kind):
     """Groups that hold nothing keep nothing, and what locked ones leave is held by others."""
@@ -420,3 +443,153 @@ def test_no_vertex_is_left_without_a_bone(kind):
     weights = weights_of(body, [bone.name for bone in rig.data.bones])
     assert np.allclose(weights.sum(axis=1), 1, atol=1e-5)
     assert weights_of(body, ["Shin.L"]).any() == (kind == "empty")
+
+
+# A skinned file elsewhere: as glTF, in a Blender without the extension, and made by the command.
+
+ROOT = Path(__file__).resolve().parents[2]
+# Without the extension: what is seen in some poses, and what the glTF exporter makes of them.
+PLAY = """
+import bpy, numpy as np, sys
+from mathutils import Quaternion
+source, target = sys.argv[-2:]
+assert not bpy.context.preferences.filepaths.use_scripts_auto_execute
+bpy.ops.wm.open_mainfile(filepath=source, use_scripts=False)
+assert not hasattr(bpy.types.Object, "arapfields")
+rig, body, seen = bpy.data.objects["Rig"], bpy.data.objects["Body"], []
+scene = bpy.context.scene
+scene.frame_start, scene.frame_end = 1, 3
+random = np.random.default_rng(0)
+for frame in (1, 2, 3):
+    for bone in rig.pose.bones:
+        bone.rotation_mode = "QUATERNION"
+        bone.rotation_quaternion = Quaternion(random.normal(size=3).tolist(), (frame - 1) * 0.3)
+        bone.keyframe_insert("rotation_quaternion", frame=frame)
+for frame in (1, 2, 3):
+    scene.frame_set(frame)
+    mesh = body.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    seen.append([list(body.matrix_world @ vertex.co) for vertex in mesh.vertices])
+keys = [key.value for key in body.data.shape_keys.key_blocks]
+np.savez(target + ".npz", seen=seen, keys=keys)
+if "{gltf}":
+    bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
+    bpy.ops.export_scene.gltf(filepath=target + ".glb", export_yup=False, export_morph_normal=False,
+                              export_frame_range=True, export_force_sampling=True, export_normals=False)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.import_scene.gltf(filepath=target + ".glb")
+    item, again = next(one for one in bpy.data.objects if one.type == "MESH" and one.vertex_groups), []
+    for key in item.data.shape_keys.key_blocks:
+        key.slider_min = -1  # which the importer leaves at 0
+    for frame in (1, 2, 3):
+        bpy.context.scene.frame_set(frame)
+        mesh = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+        points = np.array([item.matrix_world @ vertex.co for vertex in mesh.vertices])
+        again.append(points[:, [0, 2, 1]] * [1, 1, -1])  # exported with z up, read as y up
+    np.savez(target + "_again.npz", again=again)
+"""
+
+
+def save_person(path):
+    """In the worker."""
+    person()
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+
+
+def run_blender(text, environment, *arguments):
+    done = subprocess.run(
+        [sys.executable, "-c", text, *map(str, arguments)], env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+
+
+@pytest.fixture
+def skinned(blender, command, tmp_path):
+    """A .blend that the command has skinned."""
+    source, target = tmp_path / "body.blend", tmp_path / "skinned.blend"
+    blender.call(__file__, "save_person", {"path": source})
+    call = ["skin", "-i", source, "-o", target, "--quiet"]
+    done = command(*call, "--poses", 8, "--samples", 1000, "--correctives", 3)
+    assert "bones move Body" in done.stdout
+    named = command(*call, "--armature", "X", check=False)
+    assert named.returncode == 2 and "--armature names one of: Rig" in named.stderr
+    return target
+
+
+def matrices(gltf, values, node, frame):
+    """(4, 4) of a node in the world at a frame, from the animation's sampled channels."""
+    own, parents = {}, {child: k for k, one in enumerate(gltf.nodes) for child in one.children or ()}
+    for channel in gltf.animations[0].channels:
+        if channel.target.node == node:
+            sampler = gltf.animations[0].samplers[channel.sampler]
+            own[channel.target.path] = values(sampler.output)[min(frame, len(values(sampler.output)) - 1)]
+    one, result = gltf.nodes[node], np.eye(4)
+    x, y, z, w = own.get("rotation", one.rotation or (0, 0, 0, 1))
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    result[:3, :3] = turn * np.asarray(own.get("scale", one.scale or (1, 1, 1)))
+    result[:3, 3] = own.get("translation", one.translation or (0, 0, 0))
+    return matrices(gltf, values, parents[node], frame) @ result if node in parents else result
+
+
+def test_it_plays_bit_for_bit_without_the_extension_and_as_gltf(skinned, user_folder, tmp_path):
+    """The glTF by an independent reader, skinned in NumPy."""
+    register = f"import sys; sys.path[:0] = [{str(ROOT)!r}]\nimport addon\naddon.register()\n"
+    beside = PLAY.format(gltf="").replace("assert not hasattr", "assert hasattr")
+    run_blender(register + beside, user_folder, skinned, tmp_path / "with")
+    run_blender(PLAY.format(gltf="yes"), user_folder, skinned, tmp_path / "play")
+    with np.load(tmp_path / "play.npz") as played, np.load(tmp_path / "with.npz") as other:
+        seen = played["seen"]
+        assert seen.tobytes() == other["seen"].tobytes() and np.abs(played["keys"]).max() > 0.05
+    with np.load(tmp_path / "play_again.npz") as read_back:
+        for points, expected in zip(read_back["again"], seen, strict=True):  # Blender's importer
+            off = np.linalg.norm(points[:, None] - expected, axis=2).min(axis=1)
+            assert off.max() < 1e-5 * np.ptp(seen[0], axis=0).max()
+    pygltflib = pytest.importorskip("pygltflib")
+    gltf = pygltflib.GLTF2().load(str(tmp_path / "play.glb"))
+    kinds = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+    widths = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+
+    def read(place, count, component, width=1):
+        view, kind = gltf.bufferViews[place.bufferView], np.dtype(kinds[component])
+        begin = (view.byteOffset or 0) + (place.byteOffset or 0)
+        data = gltf.binary_blob()[begin : begin + count * width * kind.itemsize]
+        return np.frombuffer(data, kind).reshape(count, width)
+
+    def values(index):
+        accessor = gltf.accessors[index]
+        kind, width, sparse = accessor.componentType, widths[accessor.type], accessor.sparse
+        found = np.zeros((accessor.count, width))
+        if accessor.bufferView is not None:
+            found[:] = read(accessor, accessor.count, kind, width)
+        if sparse is not None:
+            rows = read(sparse.indices, sparse.count, sparse.indices.componentType)[:, 0]
+            found[rows] = read(sparse.values, sparse.count, kind, width)
+        return found
+
+    node = next(k for k, one in enumerate(gltf.nodes) if one.mesh is not None)
+    (primitive,) = gltf.meshes[gltf.nodes[node].mesh].primitives
+    skin = gltf.skins[gltf.nodes[node].skin]
+    binds = values(skin.inverseBindMatrices).reshape(-1, 4, 4).transpose(0, 2, 1)
+    rest, joints = values(primitive.attributes.POSITION), values(primitive.attributes.JOINTS_0).astype(int)
+    shares = values(primitive.attributes.WEIGHTS_0)
+    morphs = np.array([values(target["POSITION"]) for target in primitive.targets])
+    weights = next(
+        values(gltf.animations[0].samplers[channel.sampler].output).reshape(-1, len(morphs))
+        for channel in gltf.animations[0].channels
+        if channel.target.path == "weights"
+    )
+    for frame in range(3):
+        moved = [
+            matrices(gltf, values, joint, frame) @ bind
+            for joint, bind in zip(skin.joints, binds, strict=True)
+        ]
+        points = rest + np.einsum("k,kni->ni", weights[frame], morphs)
+        blend = np.einsum("nj,njab->nab", shares, np.array(moved)[joints])
+        posed = np.einsum("nab,nb->na", blend, np.c_[points, np.ones(len(points))])[:, :3]
+        off = np.linalg.norm(posed[:, None] - seen[frame], axis=2).min(axis=1)
+        assert off.max() < 1e-5 * np.ptp(seen[0], axis=0).max(), frame

@@ -15,7 +15,7 @@ if IN_BLENDER:
     from support.blender import scans, scenes
     from support.blender.live import pin, step
     from support.blender.scans import file_values, given, places, scan, shown, vector_values
-    from support.files import written_splats
+    from support.files import splats
     from support.files.full_disk import files_of_at_most
 
     import arapfields as af
@@ -220,8 +220,8 @@ def test_what_is_shown_is_written_in_each_format(tmp_path):
     for name in ("a.ply", "b.glb"):
         assert bpy.ops.arapfields.export_splats(filepath=str(tmp_path / name)) == {"FINISHED"}
     assert gap(af.GaussianSplats.load(tmp_path / "a.ply"), wanted) < CLOSE
-    back, name = written_splats.gltf(tmp_path / "b.glb")
-    assert name == "Scan" and gap(written_splats.with_z_up(back), wanted) < CLOSE
+    back, name = splats.gltf(tmp_path / "b.glb")
+    assert name == "Scan" and gap(splats.with_z_up(back), wanted) < CLOSE
     item.modifiers[0].show_viewport = False
     bpy.ops.arapfields.export_splats(filepath=str(tmp_path / "rest.ply"))
     rest = given().transformed(np.array(item.matrix_world))
@@ -274,9 +274,9 @@ def test_a_bake_writes_the_frames_that_live_mode_shows(tmp_path):
         bpy.context.scene.frame_set(frame)
         step(refined=True)
         path = tmp_path / "scans" / f"untitled~Scene~Scan.{frame:04d}.ply"
-        one, other = af.GaussianSplats.load(path), written_splats.gltf(path.with_suffix(".glb"))[0]
+        one, other = af.GaussianSplats.load(path), splats.gltf(path.with_suffix(".glb"))[0]
         assert gap(one, seen(item)) < CLOSE
-        assert gap(one, written_splats.with_z_up(other)) < CLOSE
+        assert gap(one, splats.with_z_up(other)) < CLOSE
     assert np.abs(one.centers - given().centers).max() > 0.5
 
 
@@ -311,12 +311,12 @@ def test_usd_is_written_where_it_knows_splats(tmp_path):
     assert bpy.ops.arapfields.bake(filepath=str(path), splat_format="USD") == {"FINISHED"}
     assert bpy.ops.arapfields.bake(filepath=str(tmp_path / "walk.ply")) == {"FINISHED"}
     for frame in (1, 2, 3):
-        back, stage = written_splats.usd(path, frame)
+        back, stage = splats.usd(path, frame)
         assert gap(back, af.GaussianSplats.load(tmp_path / f"walk.{frame:04d}.ply")) < CLOSE
     assert stage.GetEndTimeCode() == 3 and stage.GetTimeCodesPerSecond() == 24
     bpy.context.scene.frame_set(1)
     bpy.ops.arapfields.export_splats(filepath=str(tmp_path / "still.usda"))
-    assert gap(written_splats.usd(tmp_path / "still.usda")[0], seen(bpy.context.object)) < CLOSE
+    assert gap(splats.usd(tmp_path / "still.usda")[0], seen(bpy.context.object)) < CLOSE
     patch = pytest.MonkeyPatch()
     patch.setattr(usd, "SPLATS", "Unknown")
     with pytest.raises(RuntimeError, match="knows no Gaussian splats"):

@@ -16,7 +16,7 @@ if IN_BLENDER:
 
     from addon.blender import modifier_stack, vertex_groups
     from addon.core.errors import UserError
-    from addon.core.runtime.coroutines import run_to_completion
+    from addon.core.runtime.jobs import run_to_completion
     from addon.field_modifier import inputs
     from addon.handles import held_counts
     from addon.live import sessions

@@ -164,7 +164,7 @@ def test_what_is_said_of_the_handles_leaves_out_what_pins_keep_at_rest():
     scenes.activate(item)
     item.arapfields.stylize.use_handles = True
     jobs.board.messages.clear()
-    assert item.arapfields.keep_rest
+    item.arapfields.keep_rest, item.arapfields.keep_beyond = True, 1.0  # as in older files
     assert bpy.ops.arapfields.stylize(style="CUBE", **SETTINGS) == {"FINISHED"}
     (line,) = (text for _, text in jobs.messages())
     report = json.loads(bpy.data.objects["Ball_stylized"]["arapfields_report"])

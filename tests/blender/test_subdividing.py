@@ -119,3 +119,36 @@ def test_too_many_vertices_are_refused_and_the_mesh_stays():
     finally:
         subdividing.MOST_VERTICES = most
     assert len(bar.data.vertices) == before
+
+
+def test_undo_and_redo_take_the_mesh_and_its_users_along():
+    bpy.context.preferences.edit.use_global_undo = True
+    bar = scenes.bar()
+    mesh = bar.data
+    uv = mesh.uv_layers.new(name="UV")
+    for loop in mesh.loops:
+        uv.data[loop.index].uv = mesh.vertices[loop.vertex_index].co.xy
+    bpy.context.collection.objects.link(bpy.data.objects.new("Other", mesh))
+    bar.arapfields.long_triangles = 7
+    name = bar.name
+
+    def state():
+        bar, other = bpy.data.objects[name], bpy.data.objects["Other"]
+        points = [tuple(vertex.co) for vertex in bar.data.vertices]
+        faces = [tuple(face.vertices) for face in bar.data.polygons]
+        uvs = [tuple(loop.uv) for loop in bar.data.uv_layers["UV"].data]
+        return points, faces, uvs, other.data == bar.data, bar.arapfields.long_triangles
+
+    bpy.ops.ed.undo_push(message="before")
+    before = state()
+    assert bpy.ops.arapfields.subdivide(share=0.04) == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="after")
+    after = state()
+    assert len(after[0]) > len(before[0]) and before[3:] == (True, 7) and after[3:] == (False, 0)
+    for step, expected in (
+        (bpy.ops.ed.undo, before),
+        (bpy.ops.ed.redo, after),
+        (bpy.ops.ed.undo, before),
+    ):
+        assert step() == {"FINISHED"}
+        assert state() == expected

@@ -140,6 +140,72 @@ def test_a_live_object_of_its_own_comes_back_by_undo():
         end()
 
 
+def test_a_live_object_behind_its_extracted_surface_stays_hidden_under_undo():
+    """Live mode begins anew with each change of what is carried, and hides and shows nothing then."""
+    end = world.few_centers()
+    try:
+        build()
+        bar = bpy.data.objects["Bar2"]
+        bar.arapfields.resolution = 12
+        take("live", bar)
+        bpy.ops.ed.undo_push(message="live")
+        world.settle()
+        scenes.activate(bar)
+        assert bpy.ops.arapfields.extract() == {"FINISHED"}
+        bpy.ops.ed.undo_push(message="extract")
+        world.settle()
+        scenes.activate(bpy.data.objects["Bar2_implicit"], bar)
+        assert bpy.ops.arapfields.carry() == {"FINISHED"}
+        bpy.ops.ed.undo_push(message="carry")
+        world.settle()
+        assert bar.hide_get() and not bpy.data.objects["Bar2_implicit"].hide_get()
+        bpy.ops.ed.undo()
+        world.settle()
+        assert bpy.data.objects["Bar2"].hide_get() and not bpy.data.objects["Bar2_implicit"].hide_get()
+    finally:
+        end()
+
+
+def test_a_shape_held_by_an_anchor_is_in_the_step_of_the_press():
+    end = world.few_centers()
+    try:
+        world.build()
+        ball = bpy.data.objects["Ball"]
+        scenes.activate(ball)
+        assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
+        world.settle()
+        ball.arapfields.stylize.use_handles = True
+        world.settle()
+        shown = scenes.world_points(ball)
+        pin(ball, shown[0], 0.3, anchor=True)
+        bpy.ops.ed.undo_push(message="anchor")
+        assert ball.arapfields.held  # before any timer
+        world.settle()
+        bpy.ops.ed.undo_push(message="another step")
+        bpy.ops.ed.undo()
+        world.settle()
+        assert np.array_equal(scenes.world_points(bpy.data.objects["Ball"]), shown)
+    finally:
+        end()
+
+
+def test_live_mode_that_is_refused_leaves_what_the_file_says():
+    """Also where the user has removed the modifier whose motion had a name."""
+    end = world.few_centers()
+    try:
+        build()
+        bar = bpy.data.objects["Bar2"]
+        take("deform", bar)
+        bar.modifiers.remove(bar.modifiers["ARAP Fields"])
+        bar.arapfields.handles[0].weight = 0.0
+        scenes.activate(bar)
+        with pytest.raises(RuntimeError, match="weight"):
+            bpy.ops.arapfields.live()
+        assert bar.arapfields.moved_by == "DEFORM" and not bar.arapfields.live_kind
+    finally:
+        end()
+
+
 def test_a_shape_comes_back_by_undo_after_its_helper_was_emptied():
     """Without the modifier the offsets lie on the mesh, and the helper's own are gone, which no step has."""
     end = world.few_centers()

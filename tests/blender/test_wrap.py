@@ -34,7 +34,7 @@ if IN_BLENDER:
     from addon.results import visibility
     from addon.wrap import landmarks
     from addon.wrap.landmark_tools import ARAPFIELDS_OT_click_landmarks as Operator
-    from arapfields.cli import contact_sheet
+    from arapfields.cli import wrapping
 
 pytestmark = pytest.mark.in_blender
 
@@ -492,10 +492,10 @@ def test_a_page_shows_what_is_wrapped_the_worst_first():
     scenes.activate(plain, item, other)
     with pytest.raises(RuntimeError, match="Save the"):
         bpy.ops.arapfields.wrap_sheet()
-    path, drawn, cell = Path(tempfile.mkdtemp()) / "wraps.html", [], contact_sheet.cell
-    contact_sheet.cell = lambda *given: drawn.append(given[2:]) or cell(*given)
+    path, drawn, cell = Path(tempfile.mkdtemp()) / "wraps.html", [], wrapping.sheet_cell
+    wrapping.sheet_cell = lambda *given: drawn.append(given[2:]) or cell(*given)
     assert bpy.ops.arapfields.wrap_sheet(filepath=str(path), scope="SELECTED") == {"FINISHED"}
-    contact_sheet.cell = cell
+    wrapping.sheet_cell = cell
     for wrapped, there in drawn:
         assert np.abs(af.MeshSdf(*there)(wrapped[0])).mean() < 0.02
     page = path.read_text()

@@ -6,8 +6,7 @@ import types
 
 import arapfields as af
 
-from .calls import calls, splat_calls
-from .odd import ROWS, odd
+from .calls import ROWS, calls, odd, splat_calls
 
 LEFT_OUT = {  # {public callable that is not fuzzed: reason}
     "ImplicitFunction": "a base for Python: tests/python/test_implicit_function.py",

@@ -74,7 +74,7 @@ def run_files(target, seed, first, count, say):
 def run_api(seed, first, count, say):
     import arapfields as af
     from tests.fuzz import api
-    from tests.fuzz.odd import make_things
+    from tests.fuzz.calls import make_things
 
     documented = (af.InvalidInput, OSError, af.Cancelled, af.Diverged, TypeError)
     limit_memory()

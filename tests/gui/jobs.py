@@ -6,7 +6,7 @@ import time
 import bpy
 import numpy as np
 import stage
-from mouse import until, until_idle
+from stage import until, until_idle
 from support.blender import scenes
 
 from addon.core.runtime import jobs
@@ -72,17 +72,11 @@ def in_place(figures, folder, before):
 def escape(figures, before):
     """Cancels by the key over the view, which does no such thing over the sidebar or in a popup."""
     invoke(LONG)
-    stage.tool("mousemove", *SIDEBAR)
-    yield 1.5
-    stage.tool("key", "Escape")
-    yield 1.5
+    yield from stage.move(*SIDEBAR, pause=1.5)
+    yield from stage.keys("Escape", pause=1.5)
     figures["escape_over_the_sidebar_cancels"] = jobs.running() is None or jobs.running().cancelled
-    stage.tool("mousemove", 600, 500)
-    yield 0.5
-    stage.tool("key", "shift+a")
-    yield 1.5
-    stage.tool("key", "Escape")
-    yield 1.5
+    yield from stage.move(600, 500, pause=0.5)
+    yield from stage.keys("shift+a", "Escape", pause=1.5)
     figures["escape_of_a_popup_cancels"] = jobs.running() is None or jobs.running().cancelled
     begin = time.perf_counter()
     stage.tool("key", "Escape")

@@ -77,8 +77,7 @@ def sections_of_task(folder, name):
             stage.tool("mousemove", STYLES[0], round(STYLES[1] + STEP * row), "click", 1)
             yield 1.0
             stage.picture(folder, f"{name}-styles")
-            stage.tool("key", "Escape")
-            yield 0.5
+            yield from stage.keys("Escape", pause=0.5)
         elif section == "advanced":
             yield from within(folder, name, row)
         yield from press(row)
@@ -86,8 +85,7 @@ def sections_of_task(folder, name):
 
 def picture(folder, name):
     """A picture of the sidebar, with the mouse where it highlights nothing."""
-    stage.tool("mousemove", 500, 940)
-    yield 0.7
+    yield from stage.move(500, 940, pause=0.7)
     stage.picture(folder, name, SIDEBAR)
 
 
@@ -136,12 +134,10 @@ def preferences(folder, name):
             return {"FINISHED"}
 
     bpy.utils.register_class(Shown)
-    stage.tool("mousemove", 500, 400)
-    yield 0.5
+    yield from stage.move(500, 400, pause=0.5)
     with stage.override():
         bpy.ops.wm.arapfields_preferences_shown("INVOKE_DEFAULT")
     yield 1.0
     stage.picture(folder, name)
-    stage.tool("key", "Escape")
-    yield 0.7
+    yield from stage.keys("Escape", pause=0.7)
     bpy.utils.unregister_class(Shown)

@@ -8,7 +8,7 @@ bit: names of all data-blocks, positions, transforms, the handles and the shape.
 import bpy
 import numpy as np
 import stage
-from mouse import drag, hover, is_dragging, is_followed, pixel, release, until
+from stage import drag, hover, is_dragging, is_followed, pixel, release, until
 from support.blender import scenes
 
 from addon.live import sessions
@@ -75,8 +75,7 @@ def beside(figures, bar):
     yield from hover(spot)
     stage.tool("mousedown", 1)
     for step in range(1, 9):
-        stage.tool("mousemove", spot[0] + 10 * step, spot[1] + 2 * step)
-        yield 0.05
+        yield from stage.move(spot[0] + 10 * step, spot[1] + 2 * step, pause=0.05)
     stage.tool("mouseup", 1)
     yield 0.8
     figures["pins_beside_the_mesh_stays"] = state() == before
@@ -99,11 +98,9 @@ def anchor_turn_delete(figures, folder, bar):
     yield from drag(ring, (spot[0] + 33, spot[1] + 33))
     turned = np.degrees(pin.rotation_euler.y - before.y)
     figures["pins_ring_turns_degrees"] = round(float(turned), 1)
-    stage.tool("key", "r")
-    yield 0.5
+    yield from stage.keys("r", pause=0.5)
     for step in range(8):
-        stage.tool("mousemove", spot[0] + 33 - 5 * step, spot[1] + 33 + 3 * step)
-        yield 0.1
+        yield from stage.move(spot[0] + 33 - 5 * step, spot[1] + 33 + 3 * step, pause=0.1)
     stage.tool("click", 1)
     yield 0.8
     figures["pins_r_turns_degrees"] = round(float(np.degrees(pin.rotation_euler.y - before.y) - turned), 1)
@@ -119,8 +116,7 @@ def anchor_turn_delete(figures, folder, bar):
     figures["pins_ctrl_click_deletes"] = (
         len(bar.arapfields.handles) == 1 and len(bpy.data.objects) == count - 1
     )
-    stage.tool("key", "x")
-    yield from until(lambda: not bar.arapfields.handles, 5.0)
+    yield from press("x", lambda: not bar.arapfields.handles)
     figures["pins_x_deletes_the_last"] = not bar.arapfields.handles and not bar.modifiers
     figures["pins_no_stray_object"] = [item.name for item in bpy.data.objects] == ["Bar"]
 
@@ -135,8 +131,7 @@ def navigation(figures, folder, bar):
     yield from until(lambda: view.view_distance != distance, 5.0)
     yield 0.6
     middle = pixel(pin.location)
-    stage.tool("mousemove", spot[0] + 30, spot[1] - 40)
-    yield 0.6
+    yield from stage.move(spot[0] + 30, spot[1] - 40, pause=0.6)
     after = pixel(pin.location)
     reach = bar.arapfields.handles[0].reach
     stage.tool("keydown", "ctrl")
@@ -173,14 +168,19 @@ def undo_checks(figures, folder):
     for name, names in known.items():
         figures[f"undo_stray_{name}"] = sorted(set(getattr(bpy.data, name).keys()) - names)
     stage.picture(folder, "undo")
-    stage.tool("key", "ctrl+z")
-    yield from until(lambda: state() == before, 5.0)
+    yield from press("ctrl+z", lambda: state() == before)
     figures["undo_to_the_start"] = state() == before
     bar = bpy.data.objects["Bar"]
     figures["undo_leaves"] = [item.name for item in bpy.data.objects], [m.name for m in bar.modifiers]
 
 
-def record(figures, name, exact):
+def press(key, reached):
+    stage.tool("key", key)
+    yield from until(reached, 5.0)
+
+
+def record(figures, name, exact, is_exact):
+    exact.append(is_exact)
     figures[f"undo_{name}"] = {"exact": sum(exact), "of": len(exact)}
 
 
@@ -189,10 +189,8 @@ def rested(figures, before, after):
     exact = []
     for _ in range(ROUNDS):
         for key, expected in (("ctrl+z", before), ("ctrl+shift+z", after)):
-            stage.tool("key", key)
-            yield from until(lambda expected=expected: state() == expected, 5.0)
-            exact.append(state() == expected)
-            record(figures, "after_drags", exact)
+            yield from press(key, lambda expected=expected: state() == expected)
+            record(figures, "after_drags", exact, state() == expected)
 
 
 def within(figures, after):
@@ -204,24 +202,19 @@ def within(figures, after):
         end = spot[0] + (-1) ** number * 20, spot[1] + 10 * (-1) ** number
         yield from drag(spot, end, steps=3, pause=0.03, hold=True)
         held = is_dragging()
-        stage.tool("key", "ctrl+z")
-        yield 0.05
-        stage.tool("key", "ctrl+shift+z")
-        yield 0.05
+        yield from stage.keys("ctrl+z", pause=0.05)
+        yield from stage.keys("ctrl+shift+z", pause=0.05)
         held = held and is_dragging()
         stage.tool("mouseup", 1)
         yield 0.05 * (number % 4)  # also before the shape is at rest
-        stage.tool("key", "ctrl+z")
-        yield from until(lambda: state() == after and not is_dragging(), 5.0)
-        exact.append(held and state() == after)
-        record(figures, "within_drags", exact)
-        stage.tool("key", "ctrl+shift+z")
-        yield from until(lambda: state() != after, 5.0)
+        yield from press("ctrl+z", lambda: state() == after and not is_dragging())
+        record(figures, "within_drags", exact, held and state() == after)
+        yield from press("ctrl+shift+z", lambda: state() != after)
         again = state()
-        stage.tool("key", "ctrl+z")
-        yield from until(lambda: state() == after, 5.0)
-        exact.append(again != after and len(bpy.data.objects) == 2 and state() == after)
-        record(figures, "within_drags", exact)
+        yield from press("ctrl+z", lambda: state() == after)
+        record(
+            figures, "within_drags", exact, again != after and len(bpy.data.objects) == 2 and state() == after
+        )
 
 
 def escaped(figures, after):
@@ -235,7 +228,5 @@ def escaped(figures, after):
             stage.tool("key", "Escape")
             yield from release()
         else:
-            stage.tool("key", "ctrl+z")
-        yield from until(lambda: state() == after, 5.0)
-        exact.append(state() == after)
-        record(figures, "escaped", exact)
+            yield from press("ctrl+z", lambda: state() == after)
+        record(figures, "escaped", exact, state() == after)

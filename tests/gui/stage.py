@@ -1,19 +1,114 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Helpers of the checks in Blender's window: positions, pictures, judgements."""
+"""Helpers of the checks in Blender's window: mouse and keys by xdotool, positions, pictures, judgements."""
 
 import contextlib
 import json
 import os
 import subprocess
+import time
 import traceback
 
 import bpy
 import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
 from support.blender import scenes
 from verdicts import BEGUN, JUDGED, failures
 
 import addon
+from addon.core.runtime import jobs
+from addon.live import sessions
 from addon.names import PROPERTY
+from addon.pin_tool.hover import hover as hovering
+
+# Moves the mouse over the 3D view by xdotool; waits for conditions, as the machine may be busy.
+
+
+def pixel(point):
+    """Screen coordinates in pixels of a point in world space; the window fills the screen."""
+    window, area, region = view()
+    spot = location_3d_to_region_2d(region, area.spaces.active.region_3d, Vector(point))
+    return round(region.x + spot.x), round(window.height - region.y - spot.y)
+
+
+def click(spot, button=1, pause=0.6):
+    yield from move(spot[0] - 3, spot[1])
+    yield from move(*spot)
+    tool("click", button)
+    yield pause
+
+
+def keys(*names, pause=0.4):
+    for name in names:
+        tool("key", name)
+        yield pause
+
+
+def move(x, y, pause=0.3):
+    tool("mousemove", x, y)
+    yield pause
+
+
+def hover(spot):
+    yield from move(spot[0] - 4, spot[1], pause=0.2)
+    yield from move(*spot)
+
+
+def until(reached, limit=20.0, sign=lambda: None):
+    """Waits until a condition holds, at most `limit` seconds since `sign()` last changed."""
+    begin, seen = time.perf_counter(), sign()
+    while not reached() and time.perf_counter() - begin < limit:
+        yield 0.02
+        if sign() != seen:
+            begin, seen = time.perf_counter(), sign()
+    yield 0.05
+
+
+def until_idle(limit=60.0):
+    """Waits until no job runs, or a job has made no progress for `limit` seconds."""
+    yield from until(lambda: jobs.running() is None, limit, jobs.progress)
+
+
+def until_live_rests(limit=30.0):
+    """Waits until the live shapes, if any, are refined and shown."""
+    yield 0.1
+    yield from until(lambda: all(s.worker and s.worker.is_settled for s in sessions.live.values()), limit)
+    yield 0.1
+
+
+def is_followed():
+    """Whether the shape has reached the dragged handle."""
+    return all(s.worker is not None and s.worker.wait(0.0) for s in sessions.live.values())
+
+
+def is_dragging():
+    return hovering.drag is not None
+
+
+def release():
+    """Releases the button, and waits until the shape is at rest."""
+    tool("mouseup", 1)
+    yield 0.1
+    yield from until(lambda: not is_dragging())
+    yield 0.2
+
+
+def drag(start, end, steps=8, pause=0.05, hold=False):
+    """Presses the button at one pixel, moves to another, and releases it there unless `hold`."""
+    yield from hover(start)
+    tool("mousedown", 1)
+    yield from until(is_dragging, 3.0)
+    for step in range(1, steps + 1):
+        share = step / steps
+        tool("mousemove", *(round(a + share * (b - a)) for a, b in zip(start, end, strict=True)))
+        yield pause
+    yield 0.2
+    yield from until(is_followed)
+    if not hold:
+        yield from release()
+
+
+# Helpers of the checks in Blender's window: positions, pictures, judgements.
 
 PATIENCE = float(os.environ.get("ARAPFIELDS_PATIENCE", "1"))  # factor of the pauses, for a busy machine
 TAB = (1299, 340)  # the sidebar's last tab in a window of 1600 × 1000

@@ -29,8 +29,7 @@ def look():
 
 def picture(folder, name, sections):
     yield from panel.open_alone(sections)
-    stage.tool("mousemove", 500, 940)
-    yield 4.0
+    yield from stage.move(500, 940, pause=4.0)
     stage.picture(folder, f"tutorial-{name}", SHOWN)
 
 

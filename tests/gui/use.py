@@ -6,7 +6,7 @@ import jobs as window_jobs
 import numpy as np
 import stage
 from mathutils import Vector
-from mouse import pixel, until_idle, until_live_rests
+from stage import pixel, until_idle, until_live_rests
 from support.blender import scenes
 
 from addon.core.runtime import jobs
@@ -33,10 +33,8 @@ def face(figures, folder):
     at = fixed.matrix_world @ Vector((1, 0, 0))
     x, y = pixel(at)
     x2, y2 = pixel(at + Vector((0.3, 0, 0)))
-    stage.tool("mousemove", x - 3, y - 3)
-    yield 0.5
-    stage.tool("mousemove", x, y)
-    yield 0.8
+    yield from stage.move(x - 3, y - 3, pause=0.5)
+    yield from stage.move(x, y, pause=0.8)
     stage.picture(folder, "face")
     stage.tool("mousedown", 1)
     yield 0.5
@@ -84,13 +82,10 @@ def live_checks(figures, folder):
         bpy.ops.ed.undo_push(message="mark")
     yield from until_live_rests()
     rest = stage.positions("Bar")
-    stage.tool("mousemove", 600, 500)
-    yield 0.3
-    stage.tool("key", "g")
-    yield 0.3
+    yield from stage.move(600, 500, pause=0.3)
+    yield from stage.keys("g", pause=0.3)
     for step in range(1, 9):
-        stage.tool("mousemove", 600 + 8 * step, 500 - 12 * step)
-        yield 0.15
+        yield from stage.move(600 + 8 * step, 500 - 12 * step, pause=0.15)
     stage.tool("click", 1)
     yield 1.0
     yield from until_live_rests()

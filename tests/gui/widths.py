@@ -41,8 +41,7 @@ def narrower(step=8):
     window, area, _ = stage.view()
     region = next(one for one in area.regions if one.type == "UI")
     x, y = region.x, window.height - region.y - region.height // 2
-    stage.tool("mousemove", x, y)
-    yield 0.5
+    yield from stage.move(x, y, pause=0.5)
     stage.tool("mousedown", 1)
     for count in range(1, 9):
         yield 0.15

@@ -8,7 +8,7 @@ import numpy as np
 import panel
 import stage
 from mathutils import Vector
-from mouse import click, keys, pixel, until_idle
+from stage import click, keys, pixel, until_idle
 from support.blender import character, scenes, wraps
 
 from addon.blender import modifier_stack
@@ -76,8 +76,7 @@ def click_landmarks(figures, folder):
         for end, where in zip((entry.rest, entry.on_target), pair, strict=True)
     ]
     figures["wrap_landmarks_off_by"] = away
-    stage.tool("mousemove", 500, 850)
-    yield 0.6
+    yield from stage.move(500, 850, pause=0.6)
     stage.picture(folder, "wrap-landmarks")
 
 
@@ -105,8 +104,7 @@ def press(figures, folder):
     stage.picture(folder, "wrap-running")
     yield from until_idle(400.0)
     yield 1.0
-    stage.tool("mousemove", 500, 850)
-    yield 0.6
+    yield from stage.move(500, 850, pause=0.6)
     stage.picture(folder, "wrap-wrapped")
     wrapped, moved = shape(), wraps.joints(rig, posed=False)
     figures["wrap_moves"] = [

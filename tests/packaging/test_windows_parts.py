@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT))
 
 from tests.windows import __main__ as windows  # noqa: E402
 from tests.windows import environment  # noqa: E402
-from tests.windows.not_run import NOT_RUN  # noqa: E402
+from tests.windows.plugin import NOT_RUN  # noqa: E402
 
 TOOLS = ("x86_64-w64-mingw32-g++-posix", "make")
 WINE = shutil.which("wine64") or shutil.which("/usr/lib/wine/wine64")

@@ -16,7 +16,6 @@ sys.path[:0] = [str(ROOT / "blender_scripts"), str(ROOT / "cmake/wheel")]
 
 import build_extension  # noqa: E402
 import python_headers  # noqa: E402
-from extension import archive, guide  # noqa: E402
 from platforms import PLATFORMS, PYTHONS, declared  # noqa: E402
 
 # What make extension and make wheels refuse: parts that lack, wheels that were changed, foreign needs.
@@ -38,13 +37,13 @@ def written(folder, wheels, guide=("guide/index.html",)):
     addon.mkdir(exist_ok=True)
     (addon / "__init__.py").touch()
     (addon / "blender_manifest.toml").write_bytes((ROOT / "addon/blender_manifest.toml").read_bytes())
-    archive.write_extension(addon, wheels, "", dict.fromkeys(guide, ""), path, "linux-arm64")
+    build_extension.write_extension(addon, wheels, "", dict.fromkeys(guide, ""), path, "linux-arm64")
     return path
 
 
 def test_a_complete_zip_passes_and_names_its_platform(wheels, tmp_path):
     path = written(tmp_path, wheels)
-    archive.check_zip(path, wheels)
+    build_extension.check_zip(path, wheels)
     with zipfile.ZipFile(path) as content:
         manifest = content.read("blender_manifest.toml").decode()
     assert 'platforms = ["linux-arm64"]' in manifest and "(not yet run)" in manifest
@@ -52,18 +51,18 @@ def test_a_complete_zip_passes_and_names_its_platform(wheels, tmp_path):
 
 def test_incomplete_zips_are_refused(wheels, tmp_path, monkeypatch):
     with pytest.raises(RuntimeError, match="lacks guide/index"):
-        archive.check_zip(written(tmp_path, wheels, ()), wheels)
+        build_extension.check_zip(written(tmp_path, wheels, ()), wheels)
     with pytest.raises(RuntimeError, match=r"lacks wheels/arapfields.*cp314"):
-        archive.check_zip(written(tmp_path, wheels[:2]), wheels)
+        build_extension.check_zip(written(tmp_path, wheels[:2]), wheels)
     with pytest.raises(RuntimeError, match="other wheels"):
-        archive.check_zip(written(tmp_path, wheels), wheels[:2])
+        build_extension.check_zip(written(tmp_path, wheels), wheels[:2])
     path = written(tmp_path, wheels)
-    monkeypatch.setattr(archive, "LIMIT", 100)
+    monkeypatch.setattr(build_extension, "LIMIT", 100)
     with pytest.raises(RuntimeError, match="the limit is"):
-        archive.check_zip(path, wheels)
+        build_extension.check_zip(path, wheels)
     wheels[1].write_bytes(b"another")
     with pytest.raises(RuntimeError, match=r"another arapfields.*cp313"):
-        archive.check_zip(path, wheels)
+        build_extension.check_zip(path, wheels)
     wheels[2].unlink()
     with pytest.raises(RuntimeError, match=r"lacks arapfields-0.1.0-cp314-cp314-mac.*PLATFORM=macos-arm64"):
         build_extension.own_wheels(MACS, tmp_path, "0.1.0")
@@ -200,7 +199,7 @@ def test_it_is_enabled_and_says_so(tmp_path):
 
 @pytest.fixture(scope="module")
 def files():
-    return guide.guide_files(ROOT / "docs")
+    return build_extension.guide_files(ROOT / "docs")
 
 
 def test_every_guide_page_ships_and_its_links_resolve(files):

@@ -17,16 +17,15 @@ import pytest
 import trimesh
 from support.files.archives import names
 from support.files.full_disk import files_of_at_most
-from support.geometry.bar import LEFT, RIGHT, turned
-from support.geometry.meshes import sphere
+from support.geometry.meshes import LEFT, RIGHT, sphere, turned
 from support.programs.cli import process, run
 
 import arapfields as af
 from arapfields._files import whole_file
 from arapfields._locks import lock
 from arapfields._native import InvalidInput
+from arapfields.cli.animate import STEPS, TOLERANCE
 from arapfields.cli.files import read_mesh
-from arapfields.cli.frame_solver import STEPS, TOLERANCE
 from arapfields.cli.frames import FrameStore
 from arapfields.cli.handles import read_tracks
 from arapfields.cli.usd import write_usd

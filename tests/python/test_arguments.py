@@ -335,7 +335,7 @@ PRELUDE = """
 import resource, sys, numpy as np, arapfields as af
 from pathlib import Path
 sys.path[:0] = TESTS, ROOT
-from fuzz.odd import make_things, TETRAHEDRON, FACES, ROWS, NORMALS
+from fuzz.calls import make_things, TETRAHEDRON, FACES, ROWS, NORMALS
 pages = int(Path("/proc/self/statm").read_text().split()[0])
 limit = pages * resource.getpagesize() + (3 << 30)
 things = make_things()

@@ -13,7 +13,7 @@ from support.programs.cli import run
 
 import arapfields as af
 from arapfields.cli import frames as store
-from arapfields.cli import wrap_sequence
+from arapfields.cli import wrapping
 from arapfields.cli.wrapping import read_landmarks, write_landmarks
 
 # The verb wrap.
@@ -217,7 +217,7 @@ def wraps_counted(monkeypatch, stop_at=None):
         wrapped.append(name)
         return field
 
-    monkeypatch.setattr(wrap_sequence, "with_progress", with_progress)
+    monkeypatch.setattr(wrapping, "with_progress", with_progress)
     return wrapped
 
 

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 import trimesh
 from support.geometry import contact_cases
-from support.geometry.bar import LEFT, RIGHT, bar_samples, box, turned
 from support.geometry.characters import FOOT, HIP, LEG, THICKNESS, trousers
 from support.geometry.contact_cases import (
     ALIKE,
@@ -20,7 +19,7 @@ from support.geometry.contact_cases import (
     live,
     solid,
 )
-from support.geometry.meshes import sphere
+from support.geometry.meshes import LEFT, RIGHT, bar_samples, handle_box, sphere, turned
 
 import arapfields as af
 from arapfields.__main__ import main
@@ -60,7 +59,7 @@ def test_a_bar_on_a_ball_comes_to_rest_however_far_its_ends_go_down():
         af.sample_mesh(mesh.vertices, mesh.faces, 8000),
         solid(trimesh.creation.icosphere(4, 0.4), [0, 0, -0.52]),
     )
-    ends = [box([side * 0.74, 0, 0], [0.09, 0.2, 0.2]) for side in (-1, 1)]
+    ends = [handle_box([side * 0.74, 0, 0], [0.09, 0.2, 0.2]) for side in (-1, 1)]
     shares = []
     for drop in np.linspace(0.08, 0.16, 6):
         down = turned(0, shift=(0, 0, -drop))
@@ -109,8 +108,8 @@ def overlapping(vertices, triangles):
 def test_crossed_legs_do_not_pass_each_other():
     vertices, triangles = af.extract_surface(trousers(), 48)[:2]
     samples = af.sample_mesh(vertices, triangles, 12000)
-    trunk = box([0, 0, 1.1], [0.3, 0.3, 0.3])
-    feet = [box([side * LEG, 0, FOOT], [0.1, 0.1, 0.1]) for side in (-1, 1)]
+    trunk = handle_box([0, 0, 1.1], [0.3, 0.3, 0.3])
+    feet = [handle_box([side * LEG, 0, FOOT], [0.1, 0.1, 0.1]) for side in (-1, 1)]
     crossed = [
         turned(0, shift=(2.4 * s * LEG, 0.03 * s, 0)) @ foot for s, foot in zip((1, -1), feet, strict=True)
     ]
@@ -203,7 +202,7 @@ def test_bad_contact_settings_are_named(samples):
 @pytest.mark.parametrize("kind", ["cuboid", "pin"])
 def test_a_handle_yields_where_only_its_mirror_image_collides(kind):
     samples = af.sample_surface(trousers(), 6000, seed=0)
-    trunk, foot = box([0, 0, 1.1], [0.3, 0.3, 0.3]), box([LEG, 0, FOOT], [0.1, 0.1, 0.1])
+    trunk, foot = handle_box([0, 0, 1.1], [0.3, 0.3, 0.3]), handle_box([LEG, 0, FOOT], [0.1, 0.1, 0.1])
     way, side_of_leg = np.array([0.3, 0, 0]), np.array([LEG + THICKNESS, 0, FOOT])
     handles = [af.Cuboid(trunk, trunk), af.Cuboid(foot, turned(0, shift=way) @ foot)]
     if kind == "pin":
@@ -488,7 +487,9 @@ def test_parts_that_cut_each_other_at_rest_slide_freely():
     ]
     figure = trimesh.util.concatenate(parts)
     samples = af.sample_mesh(figure.vertices, figure.faces, 8000, seed=0)
-    handles = [box([x, 0, z], [r] * 3) for x, z, r in ((0, 0.6, 0.12), (0.5, 0.86, 0.08), (-0.5, 0.86, 0.08))]
+    handles = [
+        handle_box([x, 0, z], [r] * 3) for x, z, r in ((0, 0.6, 0.12), (0.5, 0.86, 0.08), (-0.5, 0.86, 0.08))
+    ]
     pulled = [turned(0, shift=(x, 0, 0)) @ m for x, m in zip((0, -0.1, 0.1), handles, strict=True)]
     shapes = []
     for contact in (None, af.Contact(itself=True)):
@@ -587,7 +588,7 @@ DEEPEST_TIP = 0.001  # of the size
 FLIPPED = 0.001  # of the samples, at spikes of a few centers
 FEW = af.DeformOptions(centers=200)
 QUICK_LIVE = af.LiveOptions(samples=1200, coarse_centers=40, fine_centers=200)
-TOP = box([0, 0, 0.45], [0.5, 0.5, 0.25])
+TOP = handle_box([0, 0, 0.45], [0.5, 0.5, 0.25])
 WAY = -0.25
 GROUND = -1.0
 

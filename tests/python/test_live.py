@@ -8,10 +8,19 @@ import numpy as np
 import pytest
 import safetensors
 from support.geometry import cases, meshes
-from support.geometry.bar import LEFT, RIGHT, bar_samples, box, turned
 from support.geometry.cases import box as box_handle
 from support.geometry.cases import moved, published_samples, shift, turn
-from support.geometry.fork import BOTTOM, LEGS, TIP, fork_samples
+from support.geometry.meshes import (
+    BOTTOM,
+    LEFT,
+    LEGS,
+    RIGHT,
+    TIP,
+    bar_samples,
+    fork_samples,
+    handle_box,
+    turned,
+)
 from support.oracles.energies import random_rotations
 from support.tolerances import LIVE_DRIFT, LIVE_IDENTITY, LIVE_KEEPS_UP, LIVE_ROUNDING, LIVE_WAY_BACK, TRACKED
 
@@ -130,7 +139,7 @@ def test_handles_come_and_go_and_points_pull(samples):
     with pytest.raises(af.InvalidInput, match=r"handles\[1\].*mirrors"):
         live.solve([LEFT, np.diag([-1.0, 1, 1, 1]) @ RIGHT, [0, 0, 1]])
     with pytest.raises(af.InvalidInput, match=r"handles\[0\].*no surface sample"):
-        live.set_handles([af.Cuboid(box([9, 9, 9], [1, 1, 1]), box([9, 9, 9], [1, 1, 1]))])
+        live.set_handles([af.Cuboid(handle_box([9, 9, 9], [1, 1, 1]), handle_box([9, 9, 9], [1, 1, 1]))])
     live.solve(iterations=1)  # and is usable after all that
 
 
@@ -139,7 +148,8 @@ def test_handles_come_and_go_and_points_pull(samples):
     [
         pytest.param([af.Cuboid(RIGHT, turned(180) @ RIGHT)], id="one handle"),
         pytest.param(
-            [af.Cuboid(box([0, 0, 0], [3, 3, 3]), turned(90, 2) @ box([0, 0, 0], [3, 3, 3]))], id="all"
+            [af.Cuboid(handle_box([0, 0, 0], [3, 3, 3]), turned(90, 2) @ handle_box([0, 0, 0], [3, 3, 3]))],
+            id="all",
         ),
         pytest.param([af.Point([2, 0, 0], [2, 1, 0])], id="one point"),
         pytest.param([af.Point([x, 0, 0], [x, 0, x]) for x in (-2.0, 0.0, 2.0)], id="collinear points"),

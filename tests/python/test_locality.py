@@ -4,9 +4,8 @@
 import numpy as np
 import pytest
 from support.geometry import meshes
-from support.geometry.bar import box
 from support.geometry.cases import bar_handles, bar_samples, moved, shift, turn
-from support.geometry.fork import BOTTOM, LEG, LEGS, TIP, fork_samples
+from support.geometry.meshes import BOTTOM, LEG, LEGS, TIP, fork_samples, handle_box
 
 import arapfields as af
 
@@ -86,7 +85,7 @@ def test_a_pin_pulled_far_takes_the_whole_along(samples, solve):
 @SOLVES
 def test_a_handle_of_nearly_all_carries_the_whole(samples, solve):
     motion = turn([1, 2, 0], 20, (0, 0.2, 0.1)) @ shift([0.02, 0.1, 0])
-    field = solve(samples, [moved(box([0, 0, 0.5], [0.6, 0.6, 0.6]), motion)])
+    field = solve(samples, [moved(handle_box([0, 0, 0.5], [0.6, 0.6, 0.6]), motion)])
     expected = samples.points @ motion[:3, :3].T + motion[:3, 3]
     assert np.abs(field(samples.points) - expected).max() < RIGID * SIZE
 

@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
-from support.geometry.bar import LEFT, RIGHT, bar_samples
 from support.geometry.cases import box, moved, shift
 from support.geometry.characters import FOOT, HIP, LEG, trousers
+from support.geometry.meshes import LEFT, RIGHT, bar_samples
 from support.tolerances import TRACKED
 
 import arapfields as af

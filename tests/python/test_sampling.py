@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 import scipy.spatial
-from support.geometry import cases, meshes, sheets
+from support.geometry import cases, meshes
 from support.oracles.network import Network
 from support.tolerances import ON_SURFACE
 
@@ -215,7 +215,7 @@ def test_tips_have_samples_near_them(count):
     tips = np.random.default_rng(3).choice(len(v), 20, replace=False)
     v[tips] *= 4.0
     needle, g = meshes.box((1.5, 1e-5, 1e-5))
-    both, triangles = sheets.together((v, f), (needle + np.array([0, 0, 2.0]), g))
+    both, triangles = meshes.together((v, f), (needle + np.array([0, 0, 2.0]), g))
     samples = af.sample_mesh(both, triangles, count=count)
     corners = both[triangles]
     area = 0.5 * np.linalg.norm(

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 import torch
-from support.geometry.bar import LEFT, RIGHT, bar_samples, box, turned
+from support.geometry.meshes import LEFT, RIGHT, bar_samples, handle_box, turned
 from support.oracles.energies import gradient_of
 from support.tolerances import FLOAT32_ENERGY, FLOAT64_GRADIENT
 
@@ -196,7 +196,7 @@ def test_what_cannot_be_is_named_and_nothing_moves(samples):
         (lambda: live.set_secondary_motion(options(), ground=float("inf")), "ground"),
         (lambda: live.step(None, float("nan")), "seconds"),
         (lambda: live.step(None, 0.0), "seconds"),
-        (lambda: live.step([box([0, 0, 0], [np.nan] * 3)], 0.1), "targets"),
+        (lambda: live.step([handle_box([0, 0, 0], [np.nan] * 3)], 0.1), "targets"),
         (lambda: live.step(None, 0.1, coordinates=2.0 * np.eye(4)), "coordinates"),
     ):
         with pytest.raises(af.InvalidInput, match=name):

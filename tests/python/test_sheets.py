@@ -5,7 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
-from support.geometry import cases, meshes, sheets
+from support.geometry import cases, meshes
 
 import arapfields as af
 from arapfields._native import testing
@@ -17,21 +17,21 @@ OFF = 0.01  # of a handle's samples in the mean, in sizes
 
 def leaf():
     """An elliptic leaf, hollow along its middle, without thickness, on a stem of radius .02."""
-    v, f = sheets.open_sheet(1.2, 0.7, 40, 24)
+    v, f = meshes.open_sheet(1.2, 0.7, 40, 24)
     v[:, 1] *= np.sqrt(np.clip(1 - (v[:, 0] / 0.62) ** 2, 0, 1))
     v[:, 0] += 0.55
     v[:, 2] = 0.1 * v[:, 1] ** 2
     stem, g = meshes.box((0.5, 0.02, 0.02))
     for _ in range(4):
         stem, g = meshes.subdivide(stem, g)
-    return sheets.together((v, f), (stem - np.array([0.5, 0, 0.02]), g))
+    return meshes.together((v, f), (stem - np.array([0.5, 0, 0.02]), g))
 
 
 def ear():
     """A ball with an ear on top that is .01 thick, along x."""
-    v, f = sheets.plate(1.1, 0.6, 0.01, 44, 24)
+    v, f = meshes.plate(1.1, 0.6, 0.01, 44, 24)
     v[:, 1] *= np.sqrt(np.clip(1 - ((v[:, 0] + 0.1) / 0.72) ** 2, 0.02, 1))
-    return sheets.together(meshes.sphere(), (v + np.array([1.35, 0, 0]), f))
+    return meshes.together(meshes.sphere(), (v + np.array([1.35, 0, 0]), f))
 
 
 def folded_sheet(thickness, gap, length=1.9, width=1.6):
@@ -41,7 +41,7 @@ def folded_sheet(thickness, gap, length=1.9, width=1.6):
     way = np.linspace(-1, 1, around + 1) * (length + 0.5 * np.pi * radius)
     angle = np.clip(way / radius, -np.pi / 2, np.pi / 2)
     straight = np.maximum(np.abs(way) - 0.5 * np.pi * radius, 0.0)
-    v, f = sheets.plate(2, width, thickness, around, across)
+    v, f = meshes.plate(2, width, thickness, around, across)
     rows = np.tile(np.repeat(np.arange(around + 1), across + 1), 2)
     offset = radius + v[:, 2]
     x = straight[rows] - offset * np.cos(angle[rows]) - 1
@@ -49,20 +49,20 @@ def folded_sheet(thickness, gap, length=1.9, width=1.6):
 
 
 SCENES = {
-    "plate .02": (lambda: sheets.plate(2, 2, 0.02), sheets.ends(-0.8, 0.8, sheets.arc(-0.8, 0.8, 100))),
-    "plate .005": (lambda: sheets.plate(2, 2, 0.005), sheets.ends(-0.8, 0.8, cases.turn([0, 1, 0], -90))),
-    "sheet": (lambda: sheets.open_sheet(2, 2), sheets.ends(-0.8, 0.8, sheets.arc(-0.8, 0.8, 120))),
+    "plate .02": (lambda: meshes.plate(2, 2, 0.02), meshes.ends(-0.8, 0.8, meshes.arc(-0.8, 0.8, 100))),
+    "plate .005": (lambda: meshes.plate(2, 2, 0.005), meshes.ends(-0.8, 0.8, cases.turn([0, 1, 0], -90))),
+    "sheet": (lambda: meshes.open_sheet(2, 2), meshes.ends(-0.8, 0.8, meshes.arc(-0.8, 0.8, 120))),
     "hair card": (
-        lambda: sheets.open_sheet(4, 0.4, 80, 8),
-        sheets.ends(-1.7, 1.7, sheets.arc(-1.7, 1.7, 100) @ cases.turn([1, 0, 0], 90)),
+        lambda: meshes.open_sheet(4, 0.4, 80, 8),
+        meshes.ends(-1.7, 1.7, meshes.arc(-1.7, 1.7, 100) @ cases.turn([1, 0, 0], 90)),
     ),
-    "leaf": (leaf, sheets.ends(-0.1, 0.95, sheets.arc(0.1, 0.95, 90))),
-    "ear": (ear, sheets.ends(0.5, 1.7, sheets.arc(1.05, 1.7, 90))),
+    "leaf": (leaf, meshes.ends(-0.1, 0.95, meshes.arc(0.1, 0.95, 90))),
+    "ear": (ear, meshes.ends(0.5, 1.7, meshes.arc(1.05, 1.7, 90))),
 }
 
 
 def keeps_lengths(v, f, field):
-    ratios = sheets.edge_ratios(v, f, field.apply(v, triangles=f))
+    ratios = meshes.edge_ratios(v, f, field.apply(v, triangles=f))
     return np.mean((ratios > LENGTHS[0]) & (ratios < LENGTHS[1])) > KEPT
 
 
@@ -88,7 +88,7 @@ def test_thin_shapes_keep_their_lengths_in_live_mode(name):
 def test_a_folded_sheet_opens():
     """Two leaves .01 thick with a gap of .03, joined along one side: one lies, the other turns."""
     v, f = folded_sheet(0.01, 0.03)
-    leaf = sheets.FAR
+    leaf = meshes.FAR
     low, high = cases.box((-0.2, -leaf, -leaf), (leaf, leaf, 0)), cases.box((-0.2, -leaf, 0), (leaf,) * 3)
     turn = cases.turn([0, 1, 0], -50, (-1.0, 0, 0))
     field = af.deform(af.sample_mesh(v, f), [cases.moved(low), cases.moved(high, turn)])
@@ -99,7 +99,7 @@ def test_a_folded_sheet_opens():
 @pytest.mark.parametrize("thickness", [0.02, 0.005])
 def test_a_thin_plate_is_no_thicker_than_the_least(thickness):
     """0.02 of its radius of gyration, however few samples lie opposite each other."""
-    v, f = sheets.plate(2, 2, thickness)
+    v, f = meshes.plate(2, 2, thickness)
     found = testing.thickness(af.sample_mesh(v, f))
     assert np.quantile(found, 0.98) < 0.02 * np.sqrt(2 / 3) * 1.1
 
@@ -107,8 +107,8 @@ def test_a_thin_plate_is_no_thicker_than_the_least(thickness):
 def test_a_sheet_beside_a_body_has_its_own_thickness():
     """A patch with a long boundary is a sheet; half a sphere, with a shorter one, is a body with a hole."""
     body = meshes.sphere()
-    v, f = sheets.open_sheet(1.0, 1.0)
-    samples = af.sample_mesh(*sheets.together(body, (v + np.array([0, 0, 1.4]), f)))
+    v, f = meshes.open_sheet(1.0, 1.0)
+    samples = af.sample_mesh(*meshes.together(body, (v + np.array([0, 0, 1.4]), f)))
     on_sheet = samples.points[:, 2] > 1.2
     found = testing.thickness(samples)
     assert np.allclose(found[on_sheet], 0.03, rtol=1e-9)
@@ -118,6 +118,6 @@ def test_a_sheet_beside_a_body_has_its_own_thickness():
 
 
 def test_copied_samples_know_their_sheets():
-    samples = af.sample_mesh(*sheets.open_sheet(2, 1))
+    samples = af.sample_mesh(*meshes.open_sheet(2, 1))
     copy = pickle.loads(pickle.dumps(samples))
     assert np.array_equal(testing.thickness(copy), testing.thickness(samples))

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from support.geometry import meshes
 from support.geometry.blocks import figure_with_fingers
-from support.geometry.characters import FOOT, HIP, LEG, Capsules, trousers
-from support.geometry.parts import LEG as LEG_OF_PARTS
-from support.geometry.parts import ellipsoid, figure
+from support.geometry.characters import FOOT, HIP, LEG, Capsules, ellipsoid, figure, trousers
+from support.geometry.characters import LEG_PLACE as LEG_OF_PARTS
 
 import arapfields as af
 

@@ -8,10 +8,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.files import archives, written_splats
+from support.files import archives
+from support.files import splats as written_splats
 from support.files.full_disk import files_of_at_most
+from support.files.splats import MESH, SIZE, splats
 from support.geometry import cases
-from support.geometry.scan import MESH, SIZE, splats
 from support.programs.cli import run
 
 import arapfields as af

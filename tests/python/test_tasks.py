@@ -13,8 +13,7 @@ from unittest import mock
 import numpy as np
 import pytest
 from support.geometry import cases
-from support.geometry.bar import LEFT, RIGHT, bar_samples, turned
-from support.geometry.meshes import sphere
+from support.geometry.meshes import LEFT, RIGHT, bar_samples, sphere, turned
 from support.programs.cli import wait_until_loaded
 from support.tolerances import TERMS_OF_LOSS
 

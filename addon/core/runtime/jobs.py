@@ -1,15 +1,84 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Jobs: long work on a worker thread, with progress, cancellation, and an outcome per item."""
+"""Jobs: long work on a worker thread, the main thread's part as coroutines, progress, redraws, outcomes."""
 
+import math
 import threading
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any
 
 from ..errors import UserError, as_user_error
 from .threads import start_thread
+
+# The main thread's work as coroutines: generators that yield a `Pause` every few milliseconds.
+
+SLICE = 0.02  # seconds of work on the main thread between redraws
+
+
+class Pause(Enum):
+    """Why a coroutine yields."""
+
+    REDRAW = "the window may redraw; there is more to do"
+    WORKER = "nothing to do until a worker thread is done"
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The result of a coroutine that has ended."""
+
+    value: Any
+
+
+def step_for(coroutine, seconds=SLICE):
+    """Runs a coroutine until it waits for a worker or time is up; returns Finished at its end, else None."""
+    until = time.monotonic() + seconds
+    try:
+        while next(coroutine) is Pause.REDRAW and time.monotonic() < until:
+            pass
+    except StopIteration as ended:
+        return Finished(ended.value)
+    return None
+
+
+def run_to_completion(coroutine, wait=lambda: time.sleep(0.002)):
+    """Runs a coroutine to its end and returns its result; calls `wait()` while it waits for a worker."""
+    while True:
+        try:
+            if next(coroutine) is Pause.WORKER:
+                wait()
+        except StopIteration as ended:
+            return ended.value
+
+
+# Limits the frequency of redraws by their cost.
+
+
+class RedrawThrottle:
+    """Decides when to redraw, so that drawing takes a limited share of the window's time."""
+
+    SHARE = 0.4
+    LONGEST = 5.0  # most seconds between redraws
+
+    def __init__(self, interval):
+        self.interval = interval  # least seconds between redraws
+        self._begun, self._busy = -math.inf, 0.0
+
+    def add_cost(self, seconds):
+        """Adds seconds by which an event of the window was late, as a measure of the drawing cost."""
+        self._busy += max(0.0, seconds)
+
+    def is_due(self, now):
+        return now - self._begun >= min(self.LONGEST, max(self.interval, self._busy / self.SHARE))
+
+    def begin(self, now):
+        """Called when a redraw starts."""
+        self._begun, self._busy = now, 0.0
+
+
+# Jobs: long work on a worker thread, with progress, cancellation, and an outcome per item.
 
 # Progress of an item that makes several native calls.
 
@@ -80,7 +149,7 @@ class Item:
     """One object's work: `work(tracker)` runs on the worker, `apply` receives its value on the main thread.
 
 
-    `apply` returns the line to report, or is a coroutine (runtime/coroutines.py) that does.
+    `apply` returns the line to report, or is a coroutine (runtime/jobs.py) that does.
     `preview`, if any, has `show(points)` and `clear()`, and displays the tracker's preview points.
     `edits`: references to the objects whose mesh `apply` writes.
     """

@@ -5,7 +5,8 @@ import errno
 import sys
 
 from ._native import Cancelled, Diverged, InvalidInput
-from ._streams import open_streams, say
+from ._streams import open_streams
+from .cli.command_line import failed
 from .cli.parser import parse
 
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # not errors of the input
@@ -23,19 +24,14 @@ def main(arguments=None):
     except SystemExit as stop:
         return stop.code or 0
     except (KeyboardInterrupt, Cancelled):
-        return _fail(verb, "interrupted", 130)
+        return failed(verb, "interrupted", 130)
     except OSError as error:
         where = f"{error.filename}: " if error.filename is not None else ""
-        return _fail(verb, f"{where}{error.strerror or error}", 1 if error.errno in DISK else 2)
+        return failed(verb, f"{where}{error.strerror or error}", 1 if error.errno in DISK else 2)
     except (InvalidInput, ImportError) as error:
-        return _fail(verb, error, 2)
+        return failed(verb, error, 2)
     except (Diverged, MemoryError) as error:
-        return _fail(verb, str(error) or "out of memory", 1)
-
-
-def _fail(verb, reason, code):
-    say(f"{verb}: {' '.join(str(reason).split())}")
-    return code
+        return failed(verb, str(error) or "out of memory", 1)
 
 
 if __name__ == "__main__":

@@ -21,11 +21,11 @@ def open_streams():
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
 
 
-def say(text, name="stderr"):
-    """Prints a line to the standard stream of this name; a stream that fails gets nothing more."""
+def say(text, name="stderr", end="\n"):
+    """Prints a text to the standard stream of this name; a stream that fails gets nothing more."""
     stream = getattr(sys, name)
     try:
-        print(text, file=stream, flush=True)
+        print(text, end=end, file=stream, flush=True)
     except (OSError, ValueError):
         swallow(stream)
 

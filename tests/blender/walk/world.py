@@ -10,14 +10,14 @@ from support.blender import scenes
 
 from addon.blender import mesh_arrays, modifier_stack, user_preferences
 from addon.blender.object_references import owner_of, settings_of
-from addon.core.runtime.coroutines import run_to_completion
+from addon.core.runtime.jobs import run_to_completion
 from addon.live import sessions
 from addon.results import placement
 from addon.solver import frame_solver, setup
 from addon.solver.frame_solver import FrameSolver
 from addon.solver.source_reader import SourceReader
 
-WAIT = 30  # seconds for a shape to settle
+WAIT = 120  # seconds at most for a shape to settle; a busy machine needs them
 NAMES = ("Bar", "Ball", "Shell")
 FEW = {"coarse_centers": 10, "fine_centers": 40, "samples": 400}
 

@@ -9,8 +9,7 @@ import secrets
 import sys
 import time
 
-from .plan import Walk, draw
-from .run import Blender, report, shorten
+from .run import Blender, Walk, draw, report, shorten
 
 
 def main():

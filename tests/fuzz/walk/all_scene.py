@@ -136,7 +136,10 @@ def picture():
         if item.library is not None:
             continue
         settings, seen = settings_of(item), not is_disabled(item)
-        points = scenes.world_points(item).tobytes() if seen and item.type == "MESH" else b""
+        session = sessions.live.get(item.session_uid)
+        swings = session is not None and session.has_motion  # secondary motion goes on from tick to tick
+        is_shown = seen and item.type == "MESH" and not swings
+        points = scenes.world_points(item).tobytes() if is_shown else b""
         found[item.name_full] = {
             "place": [round(x, 5) for row in item.matrix_world for x in row] if seen else [],
             "points": hashlib.sha1(points).hexdigest(),

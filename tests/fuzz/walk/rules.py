@@ -97,8 +97,11 @@ class Shapes:
             mine = item == self.steps.source
             key = old if mine else item.name
             earlier = before[1].get(key)
+            moves_along = name == "place_source" and settings_of(item).held and np.array_equal(now, earlier)
             if mine and said in ("press", "anchor"):
                 held[key] = earlier
+            elif mine and moves_along:
+                pass  # its handles lie as before on it
             elif mine and name in MOVES and said != "cancelled drag":
                 held.pop(key, None)
             if mine:

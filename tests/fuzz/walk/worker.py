@@ -50,8 +50,8 @@ def main():
     output = Output()
     import addon
     from tests.blender.walk import world
-    from tests.fuzz.walk.plan import Walk
     from tests.fuzz.walk.rules import All, Shapes
+    from tests.fuzz.walk.run import Walk
 
     addon.register()
     world.few_centers()

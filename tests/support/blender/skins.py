@@ -11,7 +11,7 @@ from support.geometry.nudge import nudged
 import arapfields as af
 from addon.blender import mesh_arrays, vertex_groups
 from addon.core.geometry.spaces import space_of
-from addon.core.runtime.coroutines import run_to_completion
+from addon.core.runtime.jobs import run_to_completion
 from addon.handles import empties
 from addon.handles.native_handles import native_handles
 

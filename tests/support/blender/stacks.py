@@ -8,6 +8,8 @@ from support.blender import scenes
 import arapfields
 from addon.core.geometry.spaces import space_of
 
+# Stacks of modifiers and layers of fields.
+
 # Bars with several modifiers and the field modifier, and their expected shapes.
 
 
@@ -161,3 +163,18 @@ def structure(item):
     modifiers += [m.node_group.name for m in item.modifiers if m.type == "NODES"]
     names = sorted(name for name, _ in item.data.attributes.items())
     return modifiers, names, settings.moved_by, settings.under_rig, sorted(bpy.data.objects.keys())
+
+
+# Modifier stacks that include the field modifier.
+
+STACKS = {  # FIELD: the field modifier; "keys": shape keys
+    "alone": ["FIELD"],
+    "subdivision after": ["FIELD", "SUBSURF"],
+    "subdivision before": ["SUBSURF", "FIELD"],
+    "mirror before": ["MIRROR", "FIELD"],
+    "mirror after": ["FIELD", "MIRROR"],
+    "armature before": ["ARMATURE", "FIELD"],
+    "armature after": ["FIELD", "ARMATURE"],
+    "shape keys": ["keys", "FIELD"],
+    "all": ["keys", "MIRROR", "ARMATURE", "FIELD", "SUBSURF"],
+}

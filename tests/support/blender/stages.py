@@ -11,7 +11,7 @@ from support.blender.live import WAIT
 from addon import lifecycle
 from addon.animation.operators import ARAPFIELDS_OT_bake
 from addon.core.runtime import jobs
-from addon.core.runtime.coroutines import Pause, run_to_completion
+from addon.core.runtime.jobs import Pause, run_to_completion
 from addon.deform.operators import ARAPFIELDS_OT_deform
 from addon.live import sessions
 from addon.solver import setup

@@ -12,10 +12,9 @@ from scipy.spatial.transform import Rotation
 
 import arapfields as af
 
-from .bar import LEFT, RIGHT, turned
 from .cases import box, moved, shift, turn
 from .characters import Capsules
-from .meshes import read
+from .meshes import LEFT, RIGHT, read, turned
 from .nudge import nudged, nudges
 
 # A bar pressed onto solids.

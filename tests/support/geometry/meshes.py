@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes of tests: vertices (n, 3) float64, triangles (m, 3) int64, counter-clockwise from outside.
-
-And small networks without PyTorch, for short processes.
-"""
+"""Meshes of tests, with handles that bend them: vertices (n, 3) float64, triangles (m, 3) int64."""
 
 import functools
 import os
@@ -13,7 +10,14 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from support.geometry.nudge import nudges
+from support.geometry import cases
+from support.geometry.nudge import nudged, nudges
+
+import arapfields as af
+
+# Meshes of tests: vertices (n, 3) float64, triangles (m, 3) int64, counter-clockwise from outside.
+#
+# And small networks without PyTorch, for short processes.
 
 
 def grid_triangles(rows, columns, wrap_rows=False, wrap_columns=False):
@@ -160,3 +164,128 @@ def small_layers(seed=0, width=8, layers=2, octaves=4):
     sizes = [6 * octaves, *[width] * layers, 1]
     weights = [rng.normal(size=(b, a)) / a**0.5 for a, b in pairwise(sizes)]
     return weights, [rng.normal(size=b) * 0.1 for b in sizes[1:]]
+
+
+# A bar of size 4 × 1 × 1 along x with a handle at each end.
+
+
+def bar_samples(count=6000, seed=0):
+    """Uniform samples of the bar's surface, with normals."""
+    rng = np.random.default_rng(seed)
+    half = np.array([2.0, 0.5, 0.5])
+    areas = np.array([half[1] * half[2], half[0] * half[2], half[0] * half[1]])
+    axis = rng.choice(3, size=count, p=areas / areas.sum())
+    side = rng.choice([-1.0, 1.0], size=count)
+    points = rng.uniform(-1, 1, size=(count, 3)) * half
+    normals = np.zeros((count, 3))
+    normals[np.arange(count), axis] = side
+    points[np.arange(count), axis] = side * half[axis]
+    return af.SurfaceSamples(nudged(points), normals)
+
+
+def handle_box(center, half):
+    matrix = np.diag([*map(float, half), 1.0])
+    matrix[:3, 3] = center
+    return matrix
+
+
+def turned(degrees, axis=1, shift=(0, 0, 0)):
+    angle = np.radians(degrees)
+    i, j = [(1, 2), (2, 0), (0, 1)][axis]
+    matrix = np.eye(4)
+    matrix[i, i] = matrix[j, j] = np.cos(angle)
+    matrix[i, j], matrix[j, i] = -np.sin(angle), np.sin(angle)
+    matrix[:3, 3] = shift
+    return matrix
+
+
+LEFT, RIGHT = handle_box([-1.8, 0, 0], [0.3, 0.6, 0.6]), handle_box([1.8, 0, 0], [0.3, 0.6, 0.6])
+
+
+# A fork: a tube along a U, whose legs are close in space but far apart along the surface.
+
+RADIUS, BEND, LEG = 0.15, 0.22, 1.0
+LEGS = {side: np.array([[side * BEND, 0, LEG + RADIUS]]) for side in (-1, 1)}
+BOTTOM = handle_box([0, 0, -BEND], [0.6, 0.3, 0.3])
+TIP = handle_box([BEND, 0, LEG], [0.2, 0.2, 0.2])
+
+
+def fork_samples(count=8000, seed=0):
+    """Samples with normals of legs of length LEG along z at x = ±BEND, a half circle below and round ends."""
+    rng = np.random.default_rng(seed)
+    arc, cap = np.pi * BEND, 2 * np.pi * RADIUS**2
+    tube = 2 * np.pi * RADIUS * (2 * LEG + arc)
+    on_cap = rng.random(count) < 2 * cap / (2 * cap + tube)
+    along = rng.uniform(0, 2 * LEG + arc, count)
+    angle = (np.clip(along, LEG, LEG + arc) - LEG) / BEND
+    outward = np.c_[-np.cos(angle), np.zeros(count), -np.sin(angle)]  # from the middle of the bend
+    center = BEND * outward
+    center[:, 2] += np.where(along < LEG, LEG - along, np.maximum(along - LEG - arc, 0.0))
+    turn = rng.uniform(0, 2 * np.pi, count)
+    normals = np.cos(turn)[:, None] * outward + np.sin(turn)[:, None] * [0.0, 1.0, 0.0]
+    round_ = rng.normal(size=(count, 3))
+    round_[:, 2] = np.abs(round_[:, 2])
+    round_ /= np.linalg.norm(round_, axis=1)[:, None]
+    ends = np.c_[rng.choice([-BEND, BEND], count), np.zeros(count), np.full(count, LEG)]
+    center[on_cap], normals[on_cap] = ends[on_cap], round_[on_cap]
+    return af.SurfaceSamples(nudged(center + RADIUS * normals), normals)
+
+
+# Thin plates and open sheets of tests, and handles that bend and twist them.
+
+FAR = 9.0  # of a box's sides that bound nothing
+
+
+def open_sheet(length, width, around=40, across=40):
+    """A flat rectangle about the origin, normals along z."""
+    x, y = np.meshgrid(
+        np.linspace(-length / 2, length / 2, around + 1),
+        np.linspace(-width / 2, width / 2, across + 1),
+        indexing="ij",
+    )
+    return np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], 1), grid_triangles(around + 1, across + 1)
+
+
+def plate(length, width, thickness, around=40, across=40):
+    """The same with a bottom and sides: closed."""
+    v, f = open_sheet(length, width, around, across)
+    n = len(v)
+    rows = np.arange(n).reshape(around + 1, across + 1)
+    ring = np.concatenate([rows[:, 0], rows[-1, 1:], rows[-2::-1, -1], rows[0, -2:0:-1]])
+    after = np.roll(ring, -1)
+    sides = [np.stack([ring, ring + n, after + n], 1), np.stack([ring, after + n, after], 1)]
+    lift = np.array([0, 0, thickness / 2])
+    return np.concatenate([v + lift, v - lift]), np.concatenate([f, f[:, ::-1] + n, *sides])
+
+
+def together(*parts):
+    """One mesh of several."""
+    offsets = np.cumsum([0] + [len(v) for v, _ in parts])
+    triangles = [f + offset for (_, f), offset in zip(parts, offsets[:-1], strict=True)]
+    return np.concatenate([v for v, _ in parts]), np.concatenate(triangles)
+
+
+def arc(start, end, degrees):
+    """The rigid motion of what lies beyond x = end when the strip from start to end bends up into an arc of
+    its own length."""
+    angle = np.radians(degrees)
+    radius = (end - start) / angle
+    motion = cases.turn([0, 1, 0], -degrees)
+    place = np.array([start + radius * np.sin(angle), 0, radius * (1 - np.cos(angle))])
+    motion[:3, 3] = place - motion[:3, :3] @ np.array([end, 0, 0])
+    return motion
+
+
+def ends(start, end, motion):
+    """Handles that hold what lies before x = start and move what lies beyond x = end."""
+    return [
+        cases.moved(cases.box((-FAR, -FAR, -FAR), (start, FAR, FAR))),
+        cases.moved(cases.box((end, -FAR, -FAR), (FAR, FAR, FAR)), motion),
+    ]
+
+
+def edge_ratios(vertices, triangles, moved):
+    """Lengths of the moved edges over those at rest."""
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    lengths = [np.linalg.norm(v[edges[:, 0]] - v[edges[:, 1]], axis=1) for v in (moved, vertices)]
+    return lengths[0] / lengths[1]

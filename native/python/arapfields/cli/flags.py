@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Flags that several verbs share, and the contact that they mean."""
 
-import contextlib
 import hashlib
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import arapfields as af
 
 from .._native import Contact, InvalidInput, Obstacle
 from . import sources, usd
+from .command_line import name_and_margin
 from .handles import AddHandle, MoveHandle, triple
 from .options import add_option_flag
 
@@ -54,21 +54,19 @@ def contact_of(args):
 
 def contact_key(args):
     """Values that determine the Contact, for names of solved frames."""
-    read = [(text, hashlib.blake2b(Path(_parts(text)[0]).read_bytes()).hexdigest()) for text in args.obstacle]
+    read = [
+        (text, hashlib.blake2b(Path(name_and_margin(text, is_file)[0]).read_bytes()).hexdigest())
+        for text in args.obstacle
+    ]
     return [read, args.ground, args.itself] if read or args.ground or args.itself else []
 
 
-def _parts(text):
-    """(path, margin) of "path:margin"; paths may contain colons."""
-    head, colon, tail = text.rpartition(":")
-    if colon and not Path(text).exists():
-        with contextlib.suppress(ValueError):
-            return head, float(tail)
-    return text, 0.0
+def is_file(text):
+    return Path(text).exists()
 
 
 def _obstacle(text):
-    path, margin = _parts(text)
+    path, margin = name_and_margin(text, is_file)
     function = sources.read_distance(path)
     try:
         return Obstacle(function, margin)

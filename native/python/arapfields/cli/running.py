@@ -2,15 +2,12 @@
 """Long calls with a progress bar, and outputs that are replaced atomically."""
 
 import os
-import sys
 import threading
 from pathlib import Path
 
 from .._files import naming
 from .._native import InvalidInput, OutputFile, Task
-from .._streams import swallow
-
-POLL = 0.1  # seconds between reads of a task's progress
+from .command_line import POLL, shown_progress
 
 
 def place(path):
@@ -38,52 +35,22 @@ def with_progress(label, call, quiet=False):
         finally:
             finished.set()
 
-    bar = _bar(label, quiet)
+    def progress():
+        return (1.0, "") if "result" in outcome else (task.progress, task.message)
+
     worker = threading.Thread(target=work, daemon=True)
-    worker.start()
-    try:
-        while not finished.wait(POLL):
-            _show(bar, task.progress, task.message)
-        if "result" in outcome:
-            _show(bar, 1.0, "")
-    except KeyboardInterrupt:
-        task.cancel()
-        finished.wait()
-        raise
-    finally:
-        _with(bar, lambda: bar.close())
+    with shown_progress(progress, label, quiet):
+        worker.start()
+        try:
+            while not finished.wait(POLL):  # a wait without an end would not see Ctrl-C on Windows
+                pass
+        except KeyboardInterrupt:
+            task.cancel()
+            finished.wait()
+            raise
     if "error" in outcome:
         raise outcome["error"]
     return outcome["result"]
-
-
-def _bar(label, quiet):
-    if quiet or not sys.stderr.isatty():
-        return None
-    try:
-        from tqdm import tqdm
-    except ImportError:
-        return None
-    layout = "{desc} {percentage:3.0f}% |{bar}| {elapsed}{postfix}"
-    return tqdm(total=1.0, desc=label, bar_format=layout, leave=True)
-
-
-def _show(bar, progress, message):
-    def draw():
-        bar.set_postfix_str(message, refresh=False)
-        bar.update(progress - bar.n)
-        bar.refresh()
-
-    _with(bar, draw)
-
-
-def _with(bar, draw):
-    """Draws a bar, if there is one and its terminal is still there."""
-    if bar is not None:
-        try:
-            draw()
-        except (OSError, ValueError):
-            swallow(sys.stderr)
 
 
 class Outputs:

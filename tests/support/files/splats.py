@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads splats of glTF and USD files by their specifications, in NumPy and by usd-core."""
+"""Gaussian splats of tests: a scan, and readers of glTF and USD by their specifications."""
 
 import json
 import struct
@@ -7,6 +7,10 @@ import struct
 import numpy as np
 
 import arapfields as af
+
+from ..geometry.meshes import sphere
+
+# Reads splats of glTF and USD files by their specifications, in NumPy and by usd-core.
 
 KINDS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 FROM_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
@@ -82,3 +86,21 @@ def usd(path, time=None):
     low, high = np.array(field.GetExtentAttr().Get(code))
     assert (low < centers.min(0)).all() and (high > centers.max(0)).all()
     return af.GaussianSplats(centers, turns, np.array(scales), np.array(opacities), harmonics), stage
+
+
+# Gaussian splats on an ellipsoid.
+
+SIZE = np.array([0.8, 0.25, 0.2])
+MESH = (sphere(1.0, 4)[0] * SIZE, sphere(1.0, 4)[1])
+
+
+def splats(count=250, harmonics=16, width=0.05, seed=0):
+    """Flat splats of various colors on an ellipsoid."""
+    rng = np.random.default_rng(seed)
+    samples = af.sample_mesh(*MESH, count=count, seed=seed)
+    x, y, z = samples.normals.T  # rotations from z to the normals
+    turns = np.column_stack([1 + z + 1e-9, -y, x, 0 * x])
+    scales = width * np.array([1.0, 0.7, 0.1]) * rng.uniform(0.9, 1.1, (count, 3))
+    colours = 0.25 * rng.normal(size=(count, harmonics, 3))
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    return af.GaussianSplats(samples.points, turns, scales, rng.uniform(0.3, 0.95, count), colours)
