@@ -52,6 +52,14 @@ std::vector<double> radii_of(const Skeleton& skeleton, const SignedDistance& sur
   return result;
 }
 
+/// The distance of a point from a bone. The rig's own parts of it may end before the tail, where the nodes of
+/// the whole are too far apart to enclose it.
+double distance_to(const Bone& bone, const Vec3& point) {
+  const Vec3 along = bone.tail - bone.head;
+  const double share = std::clamp(along.dot(point - bone.head) / along.squaredNorm(), 0.0, 1.0);
+  return (bone.head + share * along - point).norm();
+}
+
 /// The distance between the outer halves of two bones.
 double outer_distance(const Bone& first, const Bone& second) {
   const Vec3 a = 0.5 * (first.head + first.tail), b = 0.5 * (second.head + second.tail);
@@ -82,7 +90,6 @@ std::vector<std::pair<Index, std::vector<Index>>> groups_of(const RigShape& rig,
                                                             const SignedDistance& surface) {
   const Skeleton& skeleton = rig.skeleton;
   const std::vector<double> radii = radii_of(skeleton, surface, rig.extent);
-  for (Index b = 0; b < skeleton.count(); ++b) fprintf(stderr, "%s r/s %.3f pulls %d\n", skeleton.bone(b).name.c_str(), radii[b] / rig.spacing, (int)rig.pulls[b]);//DBG
   std::vector<Index> group(skeleton.count());
   std::iota(group.begin(), group.end(), Index{0});
   for (Index a = 0; a < skeleton.count(); ++a)
@@ -113,9 +120,8 @@ void set_bones(const Skeleton& skeleton, Index hangs_on, const Points& vertices,
                FinePart& part) {
   std::vector<Index> place(skeleton.count(), -1);
   for (Index b = 0; b < skeleton.count(); ++b) {
-    const bool is_near = std::ranges::any_of(part.vertices, [&](Index v) {
-      return (skeleton.nearest(b, vertices.row(v)) - vertices.row(v).transpose()).norm() < reach;
-    });
+    const bool is_near = std::ranges::any_of(
+        part.vertices, [&](Index v) { return distance_to(skeleton.bone(b), vertices.row(v)) < reach; });
     if (!is_near || !(b == skeleton.bone(hangs_on).parent || descends(skeleton, b, hangs_on))) continue;
     place[b] = std::ssize(part.bones);
     part.bones.push_back(skeleton.bone(b));
@@ -135,10 +141,8 @@ std::optional<FinePart> part_of(const RigShape& rig, Index hangs_on, const std::
   parallel_for(0, away.size(), 256, [&](Index first, Index last) {
     for (Index v = first; v < last; ++v) {
       away[v] = std::numeric_limits<double>::infinity();
-      for (const Index b : thin) {
-        const Vec3 vertex = mesh.vertices.row(v);
-        away[v] = std::min(away[v], (skeleton.nearest(b, vertex) - vertex).norm());
-      }
+      for (const Index b : thin)
+        away[v] = std::min(away[v], distance_to(skeleton.bone(b), mesh.vertices.row(v)));
     }
   });
   std::vector<Index> near;
@@ -187,7 +191,6 @@ std::vector<FinePart> fine_parts(const RigShape& rig, const TriangleMesh& mesh,
       ends.row(2 * k + 1) = rig.skeleton.bone(thin[k]).tail.transpose();
     }
     const double size = diagonal_of(ends);
-    fprintf(stderr, "PART %s n %d size %.3f of %.3f\n", rig.skeleton.bone(hangs_on).name.c_str(), (int)thin.size(), size, rig.extent);//DBG
     if (size > largest_part * rig.extent) continue;
     if (pieces.empty()) pieces = welded.pieces(mesh);
     if (std::optional<FinePart> part = part_of(rig, hangs_on, thin, size, mesh, welded, pieces))
