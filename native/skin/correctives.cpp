@@ -17,6 +17,7 @@
 #include "mesh/outward_triangles.h"
 #include "options/skin.h"
 #include "skin/example_poses.h"
+#include "skin/fine_parts.h"
 #include "skin/rig_shape.h"
 
 namespace arapfields {
@@ -55,9 +56,10 @@ class CorrectiveFit {
     bool mirrored;  ///< whether mirrored poses enter the regression too
   };
 
-  /// Vertices (n,3) near these nodes, weights (n, bones); throws Cancelled.
-  CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::vector<Index>& nodes,
-                const RowMatrix<float>& weights, const SkinOptions& options, const Progress& progress);
+  /// Vertices (n,3), weights (n, bones), and how far the field's shape is to be trusted at each vertex (n);
+  /// throws Cancelled.
+  CorrectiveFit(const RigShape& rig, PointsIn vertices, const Vector& trust, const RowMatrix<float>& weights,
+                const SkinOptions& options, const Progress& progress);
 
   /// Regression coefficients (columns, 3 · vertices) of every step-th vertex of a region, on polynomials
   /// (the region's features, columns).
@@ -130,7 +132,7 @@ Reflection::Reflection(const RigShape& rig, PointsIn points) : mirror(rig, point
                           bone_axes(rig.skeleton.bone(b))));
 }
 
-CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::vector<Index>& nodes,
+CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const Vector& trust,
                              const RowMatrix<float>& weights, const SkinOptions& options,
                              const Progress& progress)
     : reflection(rig, vertices), region_of_(vertices.rows(), -1), right_(vertices.rows()) {
@@ -172,7 +174,7 @@ CorrectiveFit::CorrectiveFit(const RigShape& rig, PointsIn vertices, const std::
         const Mat3 linear = blend.leftCols<3>();
         const Vec3 off = linear.inverse() * (there - linear * rest - blend.col(3));
         if (!off.allFinite()) continue;
-        const auto trusted = static_cast<float>(rig.key_trust[nodes[i]]);
+        const auto trusted = static_cast<float>(trust[i]);
         Index row = 0;
         for (const Index b : regions[region_of_[i]].joints) {
           right_[i].middleRows<joint_features>(row) += features.segment<joint_features>(b * joint_features) *
@@ -350,9 +352,14 @@ std::vector<Corrective> skin_correctives(const TriangleMesh& given, const std::v
   const WeldedVertices welded(mesh);
   const RigShape rig = rig_shape(mesh, welded, painted, bones, options, progress);
   const Index n = mesh.vertices.rows();
-  std::vector<Index> nodes = rig.nearest_nodes({mesh.vertices, welded.normals, welded.pieces(mesh)});
-  for (Index i = 0; i < n; ++i) nodes[i] = nodes[welded.first[i]];
-  const CorrectiveFit fit(rig, mesh.vertices, nodes, weights, options, progress.part(0.0, 0.8));
+  const std::vector<Index> nodes = rig.nearest_nodes({mesh.vertices, welded.normals, welded.pieces(mesh)});
+  Vector trust(n);
+  for (Index i = 0; i < n; ++i) trust[i] = rig.key_trust[nodes[welded.first[i]]];
+  // The field of the whole moves fingers as one: keys would take them there.
+  for (const FinePart& part : fine_parts(rig, mesh, welded))
+    for (std::size_t k = 0; k < part.vertices.size(); ++k)
+      trust[part.vertices[k]] *= 1.0 - part.shares[static_cast<Index>(k)];
+  const CorrectiveFit fit(rig, mesh.vertices, trust, weights, options, progress.part(0.0, 0.8));
   progress.report(0.8, "Correctives");
   const std::vector<Key> keys =
       chosen_keys(rig.skeleton, fit, effects_of(rig, fit, progress), options.correctives);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -20,6 +21,14 @@ namespace {
 constexpr Index most_nodes = 4000;
 /// Largest distance of neighbours, in node spacings.
 constexpr double neighbour_spacings = 2.5;
+/// Nodes are compared up to this distance, in spacings: a point's nearest node is at most about one from it,
+/// and the values of those within 2.5 are blended.
+constexpr double compared_spacings = 3.5;
+/// Depth of eyes below the surface, in spacings.
+constexpr double eye_spacings = 0.15;
+/// Two nodes that do not see each other are on two sides of a gap if the way inside is longer than the
+/// straight one by this factor, and by this many spacings; around a bend it is not.
+constexpr double gap_ratio = 1.5, gap_spacings = 2.0;
 /// Tolerance of mirrored bones, in sizes of the shape.
 constexpr double symmetric_bones = 5e-3;
 
@@ -65,7 +74,9 @@ RigShape::RigShape(const SurfaceSamples& given, const std::vector<Bone>& bones, 
   // The mean spacing on a sphere of the same size.
   spacing = std::sqrt(4.0 * std::numbers::pi / static_cast<double>(size())) * extent / 2.5;
   progress.check();
-  const InteriorGraph all(nodes.points, nodes.normals, spacing);
+  find_gaps(chosen, progress);
+  const InteriorGraph all(nodes.points, nodes.normals, spacing,
+                          [&](Index i, Index j) { return !are_apart(i, j); });
   progress.check();
   const BoneRegions regions(skeleton, surface, chosen, spacing, all);
   owners = regions.owner;
@@ -100,6 +111,81 @@ RigShape::RigShape(const SurfaceSamples& given, const std::vector<Bone>& bones, 
   }
   sample_nodes = nearest_nodes(surface);
   set_handles();
+}
+
+bool RigShape::are_apart(Index node, Index other) const {
+  return !apart_.empty() && std::ranges::binary_search(apart_[node], other);
+}
+
+void RigShape::find_gaps(const std::vector<Index>& chosen, const Progress& progress) {
+  if (!samples.mesh) return;
+  sight_ = std::make_shared<const InsideSight>(*samples.mesh, samples.frame, progress);
+  const double reach = compared_spacings * spacing;
+  std::vector<std::pair<Index, Index>> pairs;
+  for (Index i = 0; i < size(); ++i)
+    for (const Index j : places_.within(nodes.points.row(i), reach))
+      if (i < j && nodes.pieces[i] == nodes.pieces[j]) pairs.emplace_back(i, j);
+  const InsideSight::Eyes eyes =
+      sight_->below(rows_of(samples.points, chosen), nodes.normals,
+                    Vector::Constant(size(), eye_spacings * spacing / samples.frame.scale));
+  progress.check();
+  const std::vector<bool> seen = sight_->see(eyes, eyes, pairs);
+  progress.check();
+  apart_.resize(size());
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+    if (!seen[k]) {
+      apart_[pairs[k].first].push_back(pairs[k].second);
+      apart_[pairs[k].second].push_back(pairs[k].first);
+    }
+  for (std::vector<Index>& others : apart_) std::ranges::sort(others);
+  const InteriorGraph graph(nodes.points, nodes.normals, spacing,
+                            [&](Index i, Index j) { return !are_apart(i, j); });
+  parallel_for(0, size(), 16, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i) {
+      if (apart_[i].empty()) continue;
+      std::vector<float> start(size(), std::numeric_limits<float>::infinity());
+      start[i] = 0.0f;
+      const std::vector<float> lengths = graph.distances_from(
+          std::move(start), static_cast<float>(gap_ratio * reach + gap_spacings * spacing));
+      std::erase_if(apart_[i], [&](Index j) {
+        const double straight = (nodes.points.row(i) - nodes.points.row(j)).norm();
+        return static_cast<double>(lengths[j]) < gap_ratio * straight + gap_spacings * spacing;
+      });
+    }
+  });
+  if (std::ranges::all_of(apart_, [](const auto& others) { return others.empty(); })) {
+    apart_.clear();
+    sight_ = nullptr;
+  }
+}
+
+std::vector<Index> RigShape::nearest_nodes(const PiecePoints& points) const {
+  std::vector<Index> result = nearest_on_own(points, nodes, spacing, enough_nodes());
+  if (!sight_) return result;
+  std::vector<Index> rows;
+  for (std::size_t i = 0; i < result.size(); ++i)
+    if (!apart_[result[i]].empty()) rows.push_back(static_cast<Index>(i));
+  if (rows.empty()) return result;
+  const auto eyes_of = [&](PointsIn places, PointsIn normals) {
+    return sight_->below(samples.frame.to_cube(places), normals,
+                         Vector::Constant(places.rows(), eye_spacings * spacing / samples.frame.scale));
+  };
+  std::vector<std::pair<Index, Index>> pairs;
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    for (const Index node : places_.within(points.points.row(rows[k]), neighbour_spacings * spacing))
+      if (nodes.pieces[node] == points.pieces[rows[k]]) pairs.emplace_back(static_cast<Index>(k), node);
+  const std::vector<bool> seen =
+      sight_->see(eyes_of(rows_of(points.points, rows), rows_of(points.normals, rows)),
+                  eyes_of(nodes.points, nodes.normals), pairs);
+  std::vector<double> least(rows.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    const auto [k, node] = pairs[p];
+    const Index i = rows[k];
+    const double cost = (points.points.row(i) - nodes.points.row(node)).squaredNorm() +
+                        spacing * spacing * (points.normals.row(i) - nodes.normals.row(node)).squaredNorm();
+    if (seen[p] && cost < least[k]) least[k] = cost, result[i] = node;
+  }
+  return result;
 }
 
 void RigShape::set_movers() {

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
+#include <vector>
+
 #include "core/task.h"
 #include "distance/welded_vertices.h"
 #include "energies/handles.h"
+#include "fields/inside_sight.h"
 #include "mesh/sample_mesh.h"
 #include "options/skin.h"
 #include "sampling/oriented_points.h"
@@ -20,10 +24,9 @@ struct RigShape {
            std::vector<Index> pieces = {});
 
   Index size() const { return nodes.points.rows(); }
-  /// For each point the nearest node of the same surface and side, or the nearest sample.
-  std::vector<Index> nearest_nodes(const PiecePoints& points) const {
-    return nearest_on_own(points, nodes, spacing, enough_nodes());
-  }
+  /// For each point the nearest node of the same surface and side, which it sees through the inside where
+  /// parts nearly touch; or the nearest sample.
+  std::vector<Index> nearest_nodes(const PiecePoints& points) const;
   std::vector<Index> nearest_samples(const PiecePoints& points) const {
     return nearest_on_own(points, surface, 0.0, enough_nodes());
   }
@@ -42,7 +45,11 @@ struct RigShape {
   bool bends(Index piece) const {
     return own_bones_.size() > 1 && piece < static_cast<Index>(own_bones_.size()) && own_bones_[piece] > 1;
   }
-  bool may_join(Index node, Index other) const { return matters(owners[node], owners[other], 0.0); }
+  bool may_join(Index node, Index other) const {
+    return matters(owners[node], owners[other], 0.0) && !are_apart(node, other);
+  }
+  /// Whether two nodes that are near each other lie on two sides of a gap, far from each other inside.
+  bool are_apart(Index node, Index other) const;
   /// Nodes of a surface within a distance of a place, ascending.
   std::vector<Index> nodes_within(const Vec3& place, double distance, Index piece) const;
   /// The bone with which a point near this node moves rigidly; −1: none.
@@ -73,14 +80,17 @@ struct RigShape {
   bool stands_alone(Index piece) const {
     return piece < static_cast<Index>(node_counts_.size()) && node_counts_[piece] >= enough_nodes();
   }
+  void find_gaps(const std::vector<Index>& chosen, const Progress& progress);
   void set_movers();
   void set_trust();
   void set_handles();
 
   OrientedPoints places_;
-  std::vector<Index> node_counts_;        // number of nodes of each surface
-  std::vector<Index> own_bones_;          // number of bones in each surface
-  std::vector<std::vector<bool>> moves_;  // (surfaces, bones) whether a bone owns much of a surface
+  std::shared_ptr<const InsideSight> sight_;  // null where the mesh is not known, or no parts nearly touch
+  std::vector<std::vector<Index>> apart_;  // (n) nodes from which each is apart, ascending; empty as sight_
+  std::vector<Index> node_counts_;         // number of nodes of each surface
+  std::vector<Index> own_bones_;           // number of bones in each surface
+  std::vector<std::vector<bool>> moves_;   // (surfaces, bones) whether a bone owns much of a surface
   bool cuts_itself_ = false;
 };
 

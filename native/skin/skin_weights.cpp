@@ -10,6 +10,7 @@
 #include "mesh/outward_triangles.h"
 #include "skin/bone_choice.h"
 #include "skin/example_poses.h"
+#include "skin/fine_parts.h"
 #include "skin/weight_fit.h"
 
 namespace arapfields {
@@ -43,8 +44,9 @@ struct Fitted {
   std::vector<ExamplePose> poses;
 };
 
-/// Fits the nodes' weights to example poses; the poses' shapes have the nodes and then these points.
-Fitted fitted_nodes(const RigShape& rig, PointsIn points, const std::vector<Index>& near,
+/// Fits the nodes' weights to example poses; the poses' shapes have the nodes and then these points. `hold`:
+/// what a bone holds moves rigidly with it, although the field may not follow that closely.
+Fitted fitted_nodes(const RigShape& rig, PointsIn points, const std::vector<Index>& near, bool hold,
                     const SkinOptions& options, const Progress& progress) {
   Points moved(rig.size() + points.rows(), 3);
   moved << rig.nodes.points, points;
@@ -52,7 +54,7 @@ Fitted fitted_nodes(const RigShape& rig, PointsIn points, const std::vector<Inde
   std::iota(nearest.begin(), nearest.end(), Index{0});
   nearest.insert(nearest.end(), near.begin(), near.end());
   ExamplePoses poses(rig, moved, options, progress.part(0.0, 0.1));
-  if (rig.cuts_itself()) poses.hold(nearest);
+  if (hold) poses.hold(nearest);
   WeightFit fit(rig);
   Fitted result;
   Random random(options.seed, example_stream);
@@ -76,10 +78,10 @@ Fitted fitted_nodes(const RigShape& rig, PointsIn points, const std::vector<Inde
 }
 
 /// Weights of points of the shape.
-RowMatrix<float> fitted_points(const RigShape& rig, const PiecePoints& given, const SkinOptions& options,
-                               const Progress& progress) {
+RowMatrix<float> fitted_points(const RigShape& rig, const PiecePoints& given, bool hold,
+                               const SkinOptions& options, const Progress& progress) {
   const std::vector<Index> near = rig.nearest_nodes(given);
-  const Fitted fitted = fitted_nodes(rig, given.points, near, options, progress);
+  const Fitted fitted = fitted_nodes(rig, given.points, near, hold, options, progress);
   progress.report(0.9, "Weights");
   const VertexBlend blend(rig, given, near);
   SkinPoints points{given.points,
@@ -95,6 +97,38 @@ RowMatrix<float> fitted_points(const RigShape& rig, const PiecePoints& given, co
   RowMatrix<float> result = point_weights(rig, points, limbs, fitted.poses, options);
   points.twins.average_twins(result);
   return result;
+}
+
+/// A fine part has fewer samples and poses than the whole, by these factors, and at least so many, if the
+/// whole has them.
+constexpr int fewer_samples = 3, fewer_poses = 4, least_part_poses = 8;
+constexpr int least_part_samples = 1000;
+/// Share of the fine parts in the work.
+constexpr double parts_work = 0.3;
+
+Vector entries_or_none(const Vector& values, const std::vector<Index>& rows) {
+  return values.size() == 0 ? values : Vector(values(rows));
+}
+
+/// Blends the own weights of a part into those of the whole.
+void refine(const FinePart& part, const VertexWeights& painted, const SkinOptions& options,
+            const Progress& progress, RowMatrix<float>& weights) {
+  SkinOptions own = options;
+  own.samples = std::max(own.samples / fewer_samples, std::min(own.samples, least_part_samples));
+  own.poses = std::max(own.poses / fewer_poses, std::min(own.poses, least_part_poses));
+  const WeldedVertices welded(part.mesh);
+  const VertexWeights stiffness{entries_or_none(painted.weights, part.vertices),
+                                entries_or_none(painted.bend_weights, part.vertices)};
+  const RigShape rig = rig_shape(part.mesh, welded, stiffness, part.bones, own, progress);
+  const RowMatrix<float> found =
+      fitted_points(rig, {part.mesh.vertices, welded.normals, welded.pieces(part.mesh)}, true, own, progress);
+  for (std::size_t k = 0; k < part.vertices.size(); ++k) {
+    const auto share = static_cast<float>(part.shares[static_cast<Index>(k)]);
+    auto row = weights.row(part.vertices[k]);
+    row *= 1.0f - share;
+    for (Index b = 0; b < found.cols(); ++b)
+      row[part.columns[rig.skeleton.original(b)]] += share * found(static_cast<Index>(k), b);
+  }
 }
 
 /// Keeps the largest `influences` entries of a row (fewer where entries are tied), and normalises it.
@@ -147,8 +181,8 @@ RowMatrix<float> skin_weights(const SurfaceSamples& samples, const std::vector<B
   options.validate();
   const ThreadScope threads(options.threads);
   const RigShape rig(samples, bones, progress);
-  return finished(rig, fitted_points(rig, rig.surface, options, progress), static_cast<Index>(bones.size()),
-                  options.influences);
+  return finished(rig, fitted_points(rig, rig.surface, rig.cuts_itself(), options, progress),
+                  static_cast<Index>(bones.size()), options.influences);
 }
 
 RowMatrix<float> skin_weights(const TriangleMesh& given, const std::vector<Bone>& bones,
@@ -159,8 +193,17 @@ RowMatrix<float> skin_weights(const TriangleMesh& given, const std::vector<Bone>
   const TriangleMesh mesh = facing_outwards(given);
   const WeldedVertices welded(mesh);
   const RigShape rig = rig_shape(mesh, welded, painted, bones, options, progress);
+  const std::vector<FinePart> parts = fine_parts(rig, mesh, welded);
+  const auto work = [&](std::size_t done) {
+    return 1.0 - parts_work * static_cast<double>(parts.size() - done) /
+                     static_cast<double>(std::max<std::size_t>(parts.size(), 1));
+  };
   RowMatrix<float> fitted =
-      fitted_points(rig, {mesh.vertices, welded.normals, welded.pieces(mesh)}, options, progress);
+      fitted_points(rig, {mesh.vertices, welded.normals, welded.pieces(mesh)}, rig.cuts_itself(), options,
+                    progress.part(0.0, parts.empty() ? 1.0 : work(0)));
+  for (std::size_t k = 0; k < parts.size(); ++k)
+    refine(parts[k], painted, options, progress.part(work(k), work(k + 1)), fitted);
+  if (!parts.empty()) RigTwins(rig, mesh.vertices).average_twins(fitted);
   make_rigid(rig, mesh, welded, fitted);
   for (Index i = 0; i < fitted.rows(); ++i) fitted.row(i) = fitted.row(welded.first[i]).eval();
   return finished(rig, std::move(fitted), static_cast<Index>(bones.size()), options.influences);

@@ -30,8 +30,10 @@ VertexBlend::VertexBlend(const RigShape& rig, const PiecePoints& given, const st
     for (Index i = begin; i < end; ++i) {
       const Vec3 point = points.row(i), normal = normals.row(i);
       std::vector<Index> near = rig.nodes_within(point, width, given.pieces[i]);
-      std::erase_if(
-          near, [&](Index node) { return !rig.tree.matters(rig.owners[node], rig.owners[nearest[i]], 0.0); });
+      std::erase_if(near, [&](Index node) {
+        return rig.are_apart(node, nearest[i]) ||
+               !rig.tree.matters(rig.owners[node], rig.owners[nearest[i]], 0.0);
+      });
       std::vector<Eigen::Vector4d> lines;
       std::vector<double> kernel;
       Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
