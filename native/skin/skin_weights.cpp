@@ -102,7 +102,7 @@ RowMatrix<float> fitted_points(const RigShape& rig, const PiecePoints& given, bo
 /// A fine part has fewer samples and poses than the whole, by these factors, and at least so many, if the
 /// whole has them.
 constexpr int fewer_samples = 3, fewer_poses = 4, least_part_poses = 8;
-constexpr int least_part_samples = 1000;
+constexpr int least_part_samples = 3000;
 /// Share of the fine parts in the work.
 constexpr double parts_work = 0.3;
 
