@@ -77,7 +77,7 @@ def _run_process(findings, seed, first, count):
     return done
 
 
-def refusals(folder="native/io", names=("archive", "document", "network_file", "field_file", "input_file")):
+def refusals(folder="native/io", names=("document", "field_file", "input_file")):
     """(file, line, fixed parts of the text) of each error in the readers' source."""
     refused = []
     for name in names:

@@ -92,6 +92,9 @@ def read_bones(path):
             )
             if unknown:
                 raise af.InvalidInput(f"{path}: bone {row['name']}: {unknown[0]} is not known")
+            for key in ("head", "tail"):
+                if key not in row:
+                    raise af.InvalidInput(f"{path}: bone {row['name']}: {key}: is missing")
             given = {key: value for key, value in row.items() if key != "parent"}
             try:
                 found.append(af.Bone(parent=numbers.get(row.get("parent")), **given))
