@@ -37,8 +37,9 @@ constexpr double detail_reach = 0.02, on_detail = 0.85, off_detail = 0.96, detai
 constexpr double momentum = 0.6;
 /// Residual of a global step's system, relative to that at its start.
 constexpr double solve_tolerance = 0.05;
-/// Rounds in which folded triangles are opened, and in which what lies around them gets its shape back, a
-/// ring more after some rounds, in sweeps; and the share of the whole that is taken back by half at last.
+/// Rounds in which folded triangles are opened, and in which what lies around them gets its shape back, in
+/// sweeps: after some rounds they are opened again, and a ring more follows. And the share of the whole that
+/// is taken back by half at last.
 constexpr int most_openings = 8, most_relaxations = 40, rounds_a_ring = 4, relaxing_sweeps = 8;
 constexpr double least_share = 0.1;
 /// Bytes that a vertex takes with its two triangles, at most.
@@ -201,33 +202,36 @@ class Finish {
     limits_.keep(positions_);
   }
 
-  /// Opens triangles that are folded but were not at the start, one vertex of each at a time; where that does
-  /// not help, gives what lies around them its shape at the start, in more and more rings; at last takes the
-  /// whole back.
+  /// Opens triangles that are folded, one vertex of each at a time; where that does not help, gives what lies
+  /// around them its former shape, in more and more rings by turns with the former; at last takes the whole
+  /// back, if some were not folded at the start.
   void spare_folds() {
     surface_.rotations(positions_, rotations_);
-    std::vector<std::int32_t> found = newly_folded();
+    std::vector<std::int32_t> found = folded();
     double share = 1.0;
     for (int round = 0; !found.empty(); ++round) {
       progress_.check();
       std::vector<std::int32_t> moved;
-      if (round < most_openings) {
+      const bool goes_on = round < most_openings + most_relaxations;
+      if (round < most_openings || (goes_on && round % rounds_a_ring == 0)) {
         for (const std::int32_t t : found)
           if (const std::int32_t node = open(t); node >= 0) moved.push_back(node);
-      } else if (round < most_openings + most_relaxations) {
+      } else if (goes_on) {
         for (const std::int32_t t : found) {
           const std::vector<std::int32_t> nodes =
               nodes_around(t, 1 + (round - most_openings) / rounds_a_ring);
-          relax(nodes);
+          relax(nodes, shape_of(t));
           moved.insert(moved.end(), nodes.begin(), nodes.end());
         }
       } else {
+        std::erase_if(found, [&](std::int32_t t) { return folded_before_[t]; });
+        if (found.empty()) break;
         const double smaller = share > least_share ? 0.5 * share : 0.0;
         positions_ = start_ + smaller / share * (positions_ - start_);
         share = smaller;
         limits_.keep(positions_);
         surface_.rotations(positions_, rotations_);
-        found = newly_folded();
+        found = folded();
         continue;
       }
       if (limits_.any()) {
@@ -235,7 +239,7 @@ class Finish {
         for (Index i = 0; i < surface_.nodes(); ++i)
           if (kept[i]) moved.push_back(static_cast<std::int32_t>(i));
       }
-      found = newly_folded(moved, found);
+      found = folded(moved, found);
     }
   }
 
@@ -248,17 +252,20 @@ class Finish {
     folded_before_ = all_folded(surface_, start_, rotations_);
   }
 
-  std::vector<std::int32_t> newly_folded() const {
+  /// The shape that a triangle gets back: that at the start, or where it is folded there, at rest.
+  const Points& shape_of(Index triangle) const { return folded_before_[triangle] ? surface_.rest() : start_; }
+
+  std::vector<std::int32_t> folded() const {
     const std::vector<char> now = all_folded(surface_, positions_, rotations_);
     std::vector<std::int32_t> result;
     for (Index t = 0; t < surface_.triangles(); ++t)
-      if (now[t] && !folded_before_[t]) result.push_back(static_cast<std::int32_t>(t));
+      if (now[t]) result.push_back(static_cast<std::int32_t>(t));
     return result;
   }
 
   /// The same after these nodes have moved since it was `found`.
-  std::vector<std::int32_t> newly_folded(const std::vector<std::int32_t>& moved,
-                                         const std::vector<std::int32_t>& found) {
+  std::vector<std::int32_t> folded(const std::vector<std::int32_t>& moved,
+                                   const std::vector<std::int32_t>& found) {
     const auto sorted = [](std::vector<std::int32_t> list) {
       std::sort(list.begin(), list.end());
       list.erase(std::unique(list.begin(), list.end()), list.end());
@@ -273,7 +280,7 @@ class Finish {
       surface_.around(i, [&](Index t, int) { near.push_back(static_cast<std::int32_t>(t)); });
     }
     for (const std::int32_t t : sorted(std::move(near)))
-      if (!folded_before_[t] && is_folded(surface_, t, positions_, rotations_)) result.push_back(t);
+      if (is_folded(surface_, t, positions_, rotations_)) result.push_back(t);
     return result;
   }
 
@@ -293,8 +300,8 @@ class Finish {
     return result;
   }
 
-  /// Gives nodes, turned as one, the shape that they have at the start, as far as what is around them lets.
-  void relax(const std::vector<std::int32_t>& nodes) {
+  /// Gives nodes, turned as one, this shape, as far as what is around them lets.
+  void relax(const std::vector<std::int32_t>& nodes, const Points& shape) {
     const auto edges = [&](std::int32_t node, auto&& visit) {
       surface_.around(node, [&](Index t, int k) {
         for (int other = 1; other < 3; ++other) {
@@ -307,7 +314,7 @@ class Finish {
     for (const std::int32_t node : nodes)
       edges(node, [&](Index j, double weight) {
         spread += weight * (positions_.row(j) - positions_.row(node)).transpose() *
-                  (start_.row(j) - start_.row(node));
+                  (shape.row(j) - shape.row(node));
       });
     const Mat3 turn = closest_rotation(spread);
     for (int sweep = 0; sweep < relaxing_sweeps; ++sweep)
@@ -316,7 +323,7 @@ class Finish {
         Vec3 sum = Vec3::Zero();
         double weights = 0.0;
         edges(node, [&](Index j, double weight) {
-          const Vec3 edge = start_.row(node) - start_.row(j), place = positions_.row(j);
+          const Vec3 edge = shape.row(node) - shape.row(j), place = positions_.row(j);
           sum += weight * (place + turn * edge);
           weights += weight;
         });
@@ -324,14 +331,15 @@ class Finish {
       }
   }
 
-  /// Gives a triangle the height over its longest edge that it has at the start: of a thin triangle the
-  /// vertex there hardly moves. Returns its node; −1 where none moves.
+  /// Gives a triangle the height over its longest edge that it has in its former shape: of a thin triangle
+  /// the vertex there hardly moves. Returns its node; −1 where none moves.
   std::int32_t open(Index t) {
+    const Points& shape = shape_of(t);
     int apex = 0;
     double longest = -1.0;
     const auto corner = [&](int k) { return surface_.corners()(t, k % 3); };
     for (int k = 0; k < 3; ++k) {
-      const double length = (start_.row(corner(k + 1)) - start_.row(corner(k + 2))).squaredNorm();
+      const double length = (shape.row(corner(k + 1)) - shape.row(corner(k + 2))).squaredNorm();
       if (length > longest && !held_[corner(k)]) {
         longest = length;
         apex = k;
@@ -339,7 +347,7 @@ class Finish {
     }
     if (!(longest > 0.0)) return -1;
     const auto from = corner(apex + 1), to = corner(apex + 2);
-    const Vec3 base = start_.row(to) - start_.row(from), side = start_.row(corner(apex)) - start_.row(from);
+    const Vec3 base = shape.row(to) - shape.row(from), side = shape.row(corner(apex)) - shape.row(from);
     const double along = side.dot(base) / longest;
     const Vec3 height = side - along * base, edge = positions_.row(to) - positions_.row(from);
     // The height lies across the edge in the plane that the triangle should have.
