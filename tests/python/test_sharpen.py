@@ -103,6 +103,18 @@ def test_the_folded_triangles_are_among_those_of_before(name):
     assert len(before) > 0 or name == "box"
 
 
+@pytest.mark.parametrize("name", sorted(meshes()))
+def test_single_folds_of_before_are_opened(name):
+    """A vertex here and there lies beyond its neighbours."""
+    vertices, triangles = meshes()[name]
+    moved = vertices * [1.3, 0.8, 1.0]
+    for triangle in triangles[np.random.default_rng(3).choice(len(triangles), 6, replace=False)]:
+        moved[triangle[0]] += 1.5 * (moved[triangle[1]] - moved[triangle[0]])
+    assert len(af.folded_triangles(vertices, triangles, moved)) > 0
+    opened = af.sharpen(vertices, triangles, moved, "cube")
+    assert len(af.folded_triangles(vertices, triangles, opened)) == 0
+
+
 def test_a_triangle_that_has_turned_over_is_folded_and_a_turned_mesh_is_not():
     vertices, triangles = sphere(1.0, 3)
     assert len(af.folded_triangles(vertices, triangles, 3 * vertices @ rotation(3).T + 1)) == 0
