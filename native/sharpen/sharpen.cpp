@@ -468,8 +468,8 @@ Points sharpen(PointsIn vertices, TrianglesIn triangles, PointsIn moved, const S
     finish.step();
   }
   progress.report(0.95, "sharpening");
-  if (part_way) finish.go_part_way(options.strength);
   if (up && std::find(held.begin(), held.end(), 1) == held.end()) finish.stand(up->normalized());
+  if (part_way) finish.go_part_way(options.strength);
   finish.spare_folds();
   for (Index v = 0; v < vertices.rows(); ++v)
     if (const std::int32_t node = surface.node_of()[v]; node >= 0) {

@@ -13,7 +13,7 @@ import arapfields as af
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender_scripts"))
 import creatures
 
-EVEN = 0.1  # of the share: the lowest vertex of a part of the way keeps its height, too
+EVEN = 0.1  # of the share: single triangles that fold on the way are opened
 ROUNDED, SINGLE = 1e-6, 1e-4  # of a size of about 1
 WEIGHT_GROWTH = 80.0  # of a cube's weight between strengths of almost nothing and 1
 FEW = {"centers": 200, "iterations": 20}
