@@ -195,9 +195,10 @@ The DeformationField that turns the surface's normals to preferred ones, as rigi
 `weights` (n,) scale the effect at each sample. Source: Kohlbrenner et al. 2021, "Gauss Stylization".
 
 Without handles the figure keeps its stance (options.keep_stance), its lowest sample along `up` (3,) keeps its
-height, and its middle its place across it. `up` is z unless given. Strength 0 is the identity,
-and a part of it goes that part of the way; with handles, contact, energies or a network it is the style's
-weight. `energies` and `callback` are those of deform; the callback's terms add style and stance. field.report is a SolveReport, with the mean preference.
+height, and its middle its place across it. `up` is z unless given. Strength 0 is the identity, and a part of
+it goes that part of the way; with handles, contact, energies or a network it is the style's weight.
+`energies` and `callback` are those of deform; the callback's terms add style and stance. field.report is a
+SolveReport, with the mean preference.
 Raises as deform does.)");
   module.def("train_inverse", &inverse_of, "field"_a, "samples"_a,
              py::arg_v("options", InverseTrainingOptions(), "InverseTrainingOptions()"), py::kw_only(),
