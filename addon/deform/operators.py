@@ -4,8 +4,8 @@ import bpy
 from ..blender.evaluation import world_matrix
 from ..blender.language import about
 from ..blender.object_references import settings_of
-from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_values, options_of
+from ..blender.user_preferences import preset_classes
 from ..core.errors import UserError
 from ..core.runtime import native
 from ..core.settings.parameters import DEFORM, is_fast

@@ -1,11 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An object's motion: its modifier, and the mesh that stores the offsets.
+"""Disables Armature modifiers whose bones are handles, while the field poses instead."""
 
-Offsets are attributes of the mesh itself, or of a helper mesh in no scene if earlier modifiers make the
-vertices, or if the mesh is linked or shared with other objects. While an object is live it has a helper in
-any case, empty if it is not needed: it may be needed between two steps of undo (blender/undo_steps.py).
-"""
-
+import json
 from dataclasses import dataclass
 
 import bpy
@@ -17,7 +13,55 @@ from ..blender.point_data import points_of
 from ..blender.references import remove_mesh_object, remove_node_modifier, remove_unused_group
 from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, SHAPE_OF
-from . import armatures, cache_modifier, inputs, masks, node_group
+from . import cache_modifier, inputs, node_group
+
+
+def silence_armatures(source):
+    """Disables them and stores their visibility; restores those that the field no longer replaces."""
+    rigs = modifier_stack.handle_rigs(source)
+    noted = read_silenced(source)
+    for modifier in source.modifiers:
+        if modifier_stack.is_replaced(modifier, rigs):
+            if key_of_silenced(noted, modifier) is None:
+                noted[str(modifier.persistent_uid)] = [modifier.show_viewport, modifier.show_render]
+            modifier.show_viewport = modifier.show_render = False
+        elif key_of_silenced(noted, modifier) is not None:
+            modifier.show_viewport, modifier.show_render = noted.pop(key_of_silenced(noted, modifier))
+    write_silenced(source, noted)
+
+
+def restore_armatures(source):
+    """Restores the visibility of all of them."""
+    noted = read_silenced(source)
+    for modifier in source.modifiers:
+        if key_of_silenced(noted, modifier) is not None:
+            modifier.show_viewport, modifier.show_render = noted[key_of_silenced(noted, modifier)]
+    write_silenced(source, {})
+
+
+def key_of_silenced(noted, modifier):
+    """Key of a stored modifier: its persistent_uid, or in files of earlier versions its name; or None."""
+    keys = str(modifier.persistent_uid), modifier.name
+    return next((key for key in keys if key in noted), None)
+
+
+def read_silenced(source):
+    text = settings_of(source).silenced
+    return json.loads(text) if text else {}
+
+
+def write_silenced(source, noted):
+    text = json.dumps(noted) if noted else ""
+    if settings_of(source).silenced != text:  # any write tags the object as updated
+        settings_of(source).silenced = text
+
+
+# An object's motion: its modifier, and the mesh that stores the offsets.
+#
+# Offsets are attributes of the mesh itself, or of a helper mesh in no scene if earlier modifiers make the
+# vertices, or if the mesh is linked or shared with other objects. While an object is live it has a helper
+# in any case, empty if it is not needed: it may be needed between two steps of undo
+# (blender/undo_steps.py).
 
 written = set()  # session_uids of objects that the add-on itself has moved since the last depsgraph update
 
@@ -50,7 +94,7 @@ def bind(context, source, expected=None, live=False):
         splats = splat_layouts.columns_of(mesh)
     if expected not in (None, count):
         raise UserError("{name} changed while it was worked on; run again", source)
-    armatures.silence(source)
+    silence_armatures(source)
     cache_modifier.suspend(source)
     on_mesh = lies_on_mesh(source)
     if splats and not on_mesh:
@@ -59,7 +103,7 @@ def bind(context, source, expected=None, live=False):
         modifier = add(source, normals, splats)
     else:
         choose_group(modifier, normals, splats)
-    masks.take(source)
+    inputs.take_mask(source)
     earlier, moved = carrier(source, modifier), snapshot(source)
     if live or not on_mesh:
         take_helper(source, modifier)
@@ -268,7 +312,7 @@ def restore(source, motion):
 def remove(source):
     """Removes the modifier with its helper data, and enables the object's Armature modifiers."""
     discard(source)
-    armatures.restore(source)
+    restore_armatures(source)
 
 
 def discard(source):

@@ -17,7 +17,7 @@ from ..core.runtime import native
 from ..core.runtime.jobs import Pause, run_to_completion, step_for
 from ..core.runtime.threads import start_thread
 from ..field_modifier import layers
-from . import empties, movers, subdivided
+from . import empties, movers, native_handles
 from .native_handles import Holding
 
 COUNTED = 4000  # number of surface samples
@@ -52,7 +52,7 @@ def counting(context, source):
     reference, below = ObjectReference(source), layers.below_pose(source, in_place)
     with modifier_stack.mesh_of(context, source, below) as shape:
         mesh = mesh_arrays.arrays_of(source, shape)
-    shown = subdivided.read(context, source, in_place, below)
+    shown = native_handles.read_subdivided(context, source, in_place, below)
     weights = yield from vertex_groups.read_weights(context, source, empties.group_names(source), in_place)
     source = reference.get()
     regions = {movers.key_of(entry): region_of(entry, weights) for entry in empties.used(source)}
@@ -84,7 +84,7 @@ def region_of(entry, weights):
 
 def points_inside(mesh, regions, shown):
     """{handle's key: number of points that it holds, -1 for a point or a pin}; on the worker.
-    `shown`: result of subdivided.read()."""
+    `shown`: result of native_handles.read_subdivided()."""
     if mesh.splats is not None:
         points = mesh.vertices
     else:
@@ -96,7 +96,7 @@ def points_inside(mesh, regions, shown):
         elif handle.kind in ("GROUP", "BONE"):
             counts[key] = len(holding.of(handle))
         else:
-            counts[key] = len(subdivided.inside(handle, points, shown)[0])
+            counts[key] = len(native_handles.points_inside(handle, points, shown)[0])
     return counts
 
 

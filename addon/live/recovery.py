@@ -13,8 +13,8 @@ from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..field_modifier import motion
 from ..names import RESULT_SUFFIX
-from ..results import result_objects, visibility
-from . import live_object, stored
+from ..results import placement, result_objects
+from . import live_modifier, stored
 from .sessions import is_live, live, poll_live, take_away
 
 
@@ -93,21 +93,21 @@ def disown(item):
     elif item.library is None:
         adopt(item)
     else:
-        live_object.forget(item)
+        live_modifier.forget(item)
     settings.live_kind = ""
 
 
 def forget_copy(item):
     """Ends a duplicate's live state; the shape that it shows stays."""
-    visibility.forget(item)
+    placement.keep_visibility(item)
     if item.data.users == 1:
         stored.put_mark(item, "")
-    live_object.forget_result(item)
+    live_modifier.forget_result(item)
 
 
 def discard_live_object(source):
     """Ends the live state and removes the live object, if any; the modifier stays as the undo step has it."""
-    item = live_object.forget(source)
+    item = live_modifier.forget(source)
     if item is not None:
         result_objects.discard(item)
 
@@ -115,14 +115,14 @@ def discard_live_object(source):
 def adopt(source):
     """Turns the live shape of a source without a session into a result."""
     settings, kind = settings_of(source), settings_of(source).live_kind
-    item = next((entry.item for entry in settings.results if entry.kind == live_object.LIVE), None)
+    item = next((entry.item for entry in settings.results if entry.kind == live_modifier.LIVE), None)
     if item is not None and not in_scene(item):
         discard_live_object(source)
         return
-    visibility.forget(source)
+    placement.keep_visibility(source)
     stored.put_mark(source, "")
     if item is not None:
-        live_object.forget(source)
+        live_modifier.forget(source)
         item.name = item.data.name = f"{source.name}{RESULT_SUFFIX[kind]}"
         result_objects.register(source, kind, settings.output, item)
     elif not in_scene(source) or not is_moved(source):

@@ -13,7 +13,7 @@ from ..blender.source_operator import ReportingOperator
 from ..core.errors import UserError
 from ..core.runtime import native
 from ..live import sessions
-from ..live.prefetch import prefetch
+from ..live.live_solver import prefetch
 from ..names import TOOL
 from . import drag, hints, pins, screen
 from .hover import View, hover, under

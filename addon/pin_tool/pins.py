@@ -15,9 +15,9 @@ from ..core.geometry.handles import box_matrix
 from ..core.geometry.spaces import inverse
 from ..core.runtime import jobs
 from ..field_modifier import layers, motion
-from ..handles import empties, movers, naming
+from ..handles import empties, movers
 from ..live import sessions
-from ..results import placement, visibility
+from ..results import placement
 from . import places
 
 REACH_STEP = 1.1  # factor of a handle's reach per step of the mouse wheel
@@ -52,7 +52,7 @@ def handles_in_view(context):
     for source in context.view_layer.objects:
         if not settings_of(source).handles or not object_references.is_source(source):
             continue
-        if any(shape.visible_get() for shape in visibility.family(source)):
+        if any(shape.visible_get() for shape in placement.source_and_results(source)):
             entries = [entry for entry in empties.used(source) if entry.kind != "BONE"]
             handles += [(source, entry) for entry in entries if entry.empty.visible_get()]
     return handles
@@ -154,8 +154,8 @@ def name(source, weights):
     """A pin's name: the vertex group with most weight there, else an unused numbered name."""
     best = max(weights, key=weights.get, default=None)
     if best is not None and weights[best] >= MAJORITY:
-        return naming.name_of_group(best)
-    return naming.numbered(source, "PIN")
+        return empties.name_of_group(best)
+    return empties.numbered(source, "PIN")
 
 
 def choose(context, empty):

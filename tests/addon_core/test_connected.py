@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from support.geometry.blocks import block_surface
 
-from addon.core.geometry.connected import closest_points
+from addon.core.geometry.edges import closest_points
 from addon.core.geometry.handles import Handle
 
 

@@ -7,7 +7,7 @@ from support.geometry.meshes import sphere
 
 import arapfields as af
 from addon.core.errors import UserError
-from addon.core.geometry import rotations, transfer
+from addon.core.geometry import spaces, transfer
 from addon.core.geometry.edges import build_edges
 from addon.core.geometry.handles import box_matrix, require_held, solve_handle
 from addon.core.geometry.spaces import inverse, pose, rigid_motion, space_of, transform, upright
@@ -167,11 +167,11 @@ def test_the_closest_rotations_are_those_of_the_singular_values():
     scales = np.array([(1, 1, 1), (1.3, 1, 0.8), (3, 1, 0.1), (1, 1, -0.5), (1, 0.5, 1e-14), (40, 2, 1)])
     left, right = (np.linalg.qr(rng.normal(size=(len(scales), 3, 3)))[0] for _ in range(2))
     left, right = (q * np.sign(np.linalg.det(q))[:, None, None] for q in (left, right))
-    found = rotations.closest(np.einsum("nij,nj,njk->nik", left, scales, right))
+    found = spaces.closest(np.einsum("nij,nj,njk->nik", left, scales, right))
     assert np.abs(found - left @ right).max() < EXACT
-    zero = rotations.closest(np.zeros((1, 3, 3)))[0]
+    zero = spaces.closest(np.zeros((1, 3, 3)))[0]
     assert np.abs(zero @ zero.T - np.eye(3)).max() < EXACT and np.linalg.det(zero) > 0
-    assert np.isnan(rotations.closest(np.full((1, 3, 3), np.nan))).all()
+    assert np.isnan(spaces.closest(np.full((1, 3, 3), np.nan))).all()
 
 
 # Edges of triangle meshes, against a search one by one.

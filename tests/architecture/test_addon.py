@@ -16,7 +16,6 @@ ORDER = [
     "jobs",
     "tasks",
     "field_modifier",
-    "field_nodes",
     "handles",
     "carried",
     "stiffness",
@@ -225,7 +224,7 @@ def test_state_is_in_objects_that_the_lifecycle_lists():
     listed = {ast.unparse(entry) for value in tuples for entry in value.elts}
     listed |= {direct.get(one, one) for one in listed}
     state = {one for path in modules() for one in state_of(path)}
-    assert {"style_object.cache", "property_definitions.listeners", "native._state"} <= state
+    assert {"style_settings.style_cache", "property_definitions.listeners", "native._state"} <= state
     unlisted = state - listed
     assert unlisted == set(ENDED_ELSEWHERE), unlisted ^ set(ENDED_ELSEWHERE)
 

@@ -23,7 +23,7 @@ if IN_BLENDER:
     from addon.core.geometry.spaces import space_of, unflattened
     from addon.core.runtime import jobs, threads
     from addon.deform import solve_job
-    from addon.deform.first_result import FirstResult, steps
+    from addon.deform.solve_job import FirstResult, steps
     from addon.field_modifier import motion
     from addon.live import sessions
     from addon.names import OFFSETS

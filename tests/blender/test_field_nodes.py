@@ -18,8 +18,7 @@ if IN_BLENDER:
     from support.blender.live import step
     from support.blender.riders import link, rider, shown
 
-    from addon.field_modifier import inputs
-    from addon.field_nodes import helper
+    from addon.field_modifier import field_nodes, inputs
     from addon.poses import applying
     from addon.solver import setup
 
@@ -141,7 +140,7 @@ def test_it_follows_what_is_solved_and_works_alone():
     scenes.activate(bar)
     bpy.ops.arapfields.remove_field()
     assert np.abs(scenes.world_points(points) - rest).max() == 0
-    bpy.data.objects.remove(helper.of(bar))
+    bpy.data.objects.remove(field_nodes.of(bar))
     assert np.abs(scenes.world_points(points) - rest).max() == 0
 
 

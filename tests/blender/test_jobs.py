@@ -33,7 +33,7 @@ if IN_BLENDER:
     from addon.deform.operators import ARAPFIELDS_OT_deform
     from addon.field_modifier import inputs
     from addon.handles import empties, operators
-    from addon.jobs import display, modal, status_bar
+    from addon.jobs import display, modal
     from addon.jobs import operators as job_operators
     from addon.jobs.modal import ModalRun
     from addon.results import placement
@@ -71,7 +71,7 @@ class Window:
 
     def status_text_set(self, text):
         said = []
-        status_bar.draw(SimpleNamespace(layout=Layout(said)), self)
+        display.draw(SimpleNamespace(layout=Layout(said)), self)
         self.texts.append(" ".join([*said, *([text] if text else [])]))
 
 

@@ -19,9 +19,9 @@ if IN_BLENDER:
     from addon.core.runtime import jobs, native, threads
     from addon.handles import held_counts
     from addon.jobs.display import display
-    from addon.live.prefetch import prefetch
+    from addon.live.live_solver import prefetch
     from addon.pin_tool import drag, hover, tool
-    from addon.viewport import previews
+    from addon.viewport import overlays
 
 pytestmark = pytest.mark.in_blender
 
@@ -91,7 +91,7 @@ def is_busy(state):
         return state.job is not None
     if state is display:
         return state._timer is not None or bool(state._previews)
-    if state is previews.shown:
+    if state is overlays.shown:
         return state.mesh is not None
     return bool(state._started) if state is host else bool(state)
 

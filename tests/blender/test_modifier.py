@@ -23,7 +23,7 @@ if IN_BLENDER:
     from addon.blender.object_references import source_of
     from addon.core.runtime import jobs
     from addon.field_modifier import inputs
-    from addon.surface import surface_fit
+    from addon.surface import source_surface
 
 pytestmark = pytest.mark.in_blender
 
@@ -265,11 +265,11 @@ def test_moving_the_modifier_does_not_age_the_fit():
     moving.location.z += 0.4
     bpy.ops.arapfields.deform(**scenes.QUICK)
     bpy.context.view_layer.update()
-    assert not surface_fit.reason(bar)
+    assert not source_surface.outdated(bar)
     bar.data.vertices[0].co.z += 0.1
     bar.data.update()
     bpy.context.view_layer.update()
-    assert surface_fit.reason(bar)
+    assert source_surface.outdated(bar)
 
 
 @pytest.mark.parametrize("way", ["off", "factor", "keyed"])

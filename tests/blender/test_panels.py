@@ -24,7 +24,7 @@ if IN_BLENDER:
     from addon.core.errors import UserError
     from addon.core.runtime import jobs
     from addon.handles import empties
-    from addon.jobs import status_bar
+    from addon.jobs import display
     from addon.live import sessions
     from addon.names import Op
 
@@ -275,7 +275,7 @@ def test_a_fit_tells_its_errors():
 def test_the_status_bar_shows_the_job_and_its_cancel():
     def texts():
         labels = []
-        status_bar.draw(type("Header", (), {"layout": Layout(labels)})(), bpy.context)
+        display.draw(type("Header", (), {"layout": Layout(labels)})(), bpy.context)
         return labels
 
     assert texts() == []
@@ -285,7 +285,7 @@ def test_the_status_bar_shows_the_job_and_its_cancel():
     finally:
         undo()
     assert texts() == []
-    assert status_bar.draw in bpy.types.STATUSBAR_HT_header.draw._draw_funcs
+    assert display.draw in bpy.types.STATUSBAR_HT_header.draw._draw_funcs
 
 
 @pytest.mark.parametrize("field", ["auto", "radial", "neural"])

@@ -20,7 +20,7 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.core.settings.choices import STYLES, style_identifier, style_name
     from addon.live import sessions
-    from addon.solver import setup, style_object
+    from addon.solver import setup, style_settings
     from addon.stylize import ball as picture
 
 pytestmark = pytest.mark.in_blender
@@ -342,9 +342,9 @@ def test_faces_of_a_mesh_opens_as_object():
 
 def test_the_picture_of_a_style_object_is_a_ball():
     bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8)
-    of_ball = picture.picture(style_object.style_of(bpy.context.object)[0])
+    of_ball = picture.picture(style_settings.style_of(bpy.context.object)[0])
     bpy.ops.mesh.primitive_cube_add()
-    of_box = picture.picture(style_object.style_of(bpy.context.object)[0])
+    of_box = picture.picture(style_settings.style_of(bpy.context.object)[0])
     middle = slice(picture.SIZE // 4, -picture.SIZE // 4)
     shades = [len(np.unique(np.round(p[middle, middle, 0], 2))) for p in (of_ball, of_box)]
     assert shades[0] > 30 and np.array_equal(of_ball[..., 3], of_box[..., 3])

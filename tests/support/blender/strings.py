@@ -65,7 +65,7 @@ def of_source():
             targets = getattr(node, "targets", [])
             if isinstance(node, ast.Assign) and getattr(targets[0], "id", "") == "title":
                 yield from literal(node.value)
-            if isinstance(node, ast.Return) and path.name == "surface_fit.py" and node.value is not None:
+            if isinstance(node, ast.Return) and path.name == "source_surface.py" and node.value is not None:
                 yield from (text for text in literal(node.value) if " the fit" in text)
             if isinstance(node, ast.For) and path.name == "panel.py" and isinstance(node.iter, ast.Tuple):
                 for row in node.iter.elts:
