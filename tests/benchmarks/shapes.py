@@ -61,7 +61,7 @@ def product_rate(size=256, rows=10_000, rounds=9):
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "blender_scripts")]
 from support.geometry import cases, meshes  # noqa: E402
-from support.oracles.network import Network  # noqa: E402
+from support.oracles import Network  # noqa: E402
 
 OURS = {"bunny": "dinosaur", "spot": "dog", "hand": "hand", "whale": "lizard", "cube": "mug"}
 CREATURES = ("dinosaur", "lizard", "octopus")

@@ -14,7 +14,7 @@ from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
-    from support.blender import scenes, strings
+    from support.blender import panels, scenes
     from support.blender.panels import Layout, drawn, each_task, prepared
 
     import addon.registration as registration
@@ -471,7 +471,7 @@ def test_the_first_start_says_where_the_extension_is_and_only_the_first():
 
 
 def test_every_text_is_translated():
-    texts = strings.every()
+    texts = panels.every()
     assert len(texts) > 250
 
     def fields(text):
@@ -482,7 +482,7 @@ def test_every_text_is_translated():
     for language, table in tables.items():
         missing = [text for text in texts if ("*", text) not in table]
         assert not missing, (language, missing)
-        stale = {text for _, text in table} - set(texts) - strings.UNTRANSLATED
+        stale = {text for _, text in table} - set(texts) - panels.UNTRANSLATED
         assert not stale, (language, stale)
         for (_, text), translated in table.items():
             assert translated and fields(text) == fields(translated), text

@@ -15,8 +15,7 @@ import zipfile
 import numpy as np
 import pytest
 import trimesh
-from support.files.archives import names
-from support.files.full_disk import files_of_at_most
+from support.files.archives import files_of_at_most, names
 from support.geometry.meshes import LEFT, RIGHT, sphere, turned
 from support.programs.cli import process, run
 
