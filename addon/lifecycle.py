@@ -14,10 +14,10 @@ from .carried import carrying
 from .core.runtime import jobs, threads
 from .deform import solve_job
 from .field_modifier import layers, motion
-from .handles import applied_transforms, empties, held_counts, left_behind, symmetry
-from .jobs import modal
+from .handles import applied_transforms, empties, held_counts, left_behind, overlays, symmetry
+from .jobs import job_operator
 from .jobs.display import display
-from .live import recovery, rendering, sessions, stored
+from .live import recovery, sessions, stored
 from .live.live_solver import prefetch
 from .pin_tool import drawing as pin_drawing
 from .pin_tool import tool
@@ -26,7 +26,6 @@ from .pin_tool.hover import hover
 from .poses import applying
 from .solver import style_settings
 from .surface import source_surface
-from .viewport import overlays
 from .wrap import landmark_tools, landmarks
 
 
@@ -108,9 +107,9 @@ def after_render(*_):
 @persistent
 def after_frame(scene, depsgraph):
     if sessions.live.is_rendering:
-        rendering.follow_frame(depsgraph)
+        recovery.follow_frame(depsgraph)
     elif sessions.live and not modifier_stack.is_stage(scene):
-        rendering.show_frame()
+        recovery.show_frame()
 
 
 HANDLERS = {  # of bpy.app.handlers
@@ -129,7 +128,7 @@ HANDLERS = {  # of bpy.app.handlers
 }
 DRAWINGS = (  # over every 3D viewport
     *((overlays.draw_previews, "POST_VIEW"), (overlays.draw_handle_boxes, "POST_VIEW")),
-    *((pin_drawing.draw, "POST_VIEW"), (rendering.draw_touching, "POST_VIEW")),
+    *((pin_drawing.draw, "POST_VIEW"), (recovery.draw_touching, "POST_VIEW")),
     *((landmark_tools.draw, "POST_PIXEL"), (pin_drawing.draw_label, "POST_PIXEL")),
     (first_run.draw, "POST_PIXEL"),
 )
@@ -145,7 +144,7 @@ PARTS = (  # what begins with the extension, and how it ends
 )
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
 # Timers are started by blender/host.py, threads by core/runtime/threads.py.
-STATE = (modal.runs, jobs.board, display, sessions.live, held_counts.pending, source_surface.changed)
+STATE = (job_operator.runs, jobs.board, display, sessions.live, held_counts.pending, source_surface.changed)
 STATE += (motion.written, carrying.written, hover, prefetch, applying.solved, overlays.shown)
 STATE += (solve_job.steps, empties.seen_active, host, style_settings.style_cache, left_behind.seen)
 STATE += (stored.shapes, applied_transforms.seen, applied_transforms.followed, status, symmetry.planes)

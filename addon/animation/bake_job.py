@@ -27,8 +27,7 @@ from ..handles import empties
 from ..jobs.job_operator import JobOperator, with_progress
 from ..solver import frame_range, style_settings
 from ..solver.frame_range import FrameFeed, Frames, playing
-from ..solver.frame_solver import FrameSolver, Request, flat
-from ..solver.setup import sampled
+from ..solver.frame_solver import FrameSolver, Request, flat, sampled
 from ..wrap import landmarks
 from . import object_bake
 from .caches import file_name, plain

@@ -19,9 +19,8 @@ from ..handles import empties
 from ..live import sessions
 from ..results import placement, result_objects
 from ..solver import contact, secondary_motion
-from ..solver.frame_solver import FrameSolver
+from ..solver.frame_solver import FrameSolver, sampled
 from ..solver.secondary_motion import Moment, Poses, Simulation
-from ..solver.setup import sampled
 from ..solver.source_reader import SourceChanged, SourceReader, has_motion_before
 from .caches import CacheFile, ShapeKeys, cache_beside, keys_weight, size_text
 from .carried_bake import CarriedBake

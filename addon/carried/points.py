@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack, undo_steps
+from ..blender import mesh_arrays, modifier_stack, references
 from ..blender.actions import remove_curves
 from ..blender.references import remove_mesh_object, remove_node_modifier
 from ..core.errors import UserError
@@ -138,7 +138,7 @@ class AttributeCarrier(Carrier):
     def bind(self, context, item, entry):
         cache_modifier.set_playing(item, False, find(item))
         if modifier_stack.find(item) is None:
-            undo_steps.refuse_new(item)
+            references.refuse_new(item)
             modifier = item.modifiers.new(FIELD_MODIFIER, "NODES")
             modifier.node_group = node_group.find_or_make()
             item.modifiers.move(len(item.modifiers) - 1, 0)  # hair grown from these follows
@@ -204,10 +204,10 @@ class KeyCarrier(Carrier):
 
     def bind(self, context, item, entry):
         if item.data.shape_keys is None:
-            undo_steps.refuse_new(item)
+            references.refuse_new(item)
             item.shape_key_add(name="Basis", from_mix=False)
         if own_key(item) is None:
-            undo_steps.refuse_new(item)
+            references.refuse_new(item)
             key = item.shape_key_add(name=WARP_KEY, from_mix=False)
             key.value = 1.0
 

@@ -285,7 +285,7 @@ class Record:
         other machines if the shared file system supports locks. Without locks every claim is granted: an
         input may then be processed twice, with the same result.
         """
-        from arapfields._locks import lock
+        from arapfields._files import lock
 
         try:
             lock(self._locks(), byte_of(name), wait=False)
@@ -296,7 +296,7 @@ class Record:
         return True
 
     def release(self, name):
-        from arapfields._locks import unlock
+        from arapfields._files import unlock
 
         unlock(self._locks(), byte_of(name))
 
@@ -313,7 +313,7 @@ class Record:
 
     def agree(self, description, anew):
         """How these settings differ from the folder's; stores them if it has none, or with `anew`."""
-        from arapfields._locks import lock
+        from arapfields._files import lock
 
         with contextlib.suppress(OSError):
             lock(self._locks(), byte_of(BATCH))

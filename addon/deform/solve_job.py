@@ -8,7 +8,7 @@ import math
 import bpy
 import numpy as np
 
-from ..blender import host, modifier_stack, undo_steps
+from ..blender import host, modifier_stack, references
 from ..blender.evaluation import depsgraph_of
 from ..blender.host import has_window
 from ..blender.language import about, translated
@@ -22,6 +22,7 @@ from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..field_modifier import layers, motion
 from ..handles import empties
+from ..handles.overlays import Preview
 from ..jobs.job_operator import JobOperator
 from ..live.sessions import end_for_job
 from ..poses import applying
@@ -29,7 +30,6 @@ from ..results import placement
 from ..results.placement import SolvedMesh, destination, placement_refusal
 from ..solver.source_reader import points_now, read_at_rest
 from ..surface.source_surface import PointsBefore
-from ..viewport.overlays import Preview
 
 # Preview of a running solve on the source itself, by its field modifier.
 #
@@ -83,7 +83,7 @@ class FirstResult:
             if not self._shown:
                 before = motion.snapshot(source)
                 # Undo ends the preview: a modifier that it has added goes before; what others refer to stays.
-                with contextlib.nullcontext() if before is None else undo_steps.between():
+                with contextlib.nullcontext() if before is None else references.between():
                     motion.bind(bpy.context, source)
                 self._shown, self._before = True, before
             local = self._surface.space.to_local(points.astype(float))
@@ -243,7 +243,7 @@ class SolveOperator(JobOperator):
 
     def push_undo(self):
         if self.ended_live:
-            undo_steps.push("Live")
+            references.push("Live")
 
     def end_live(self, context, source, kind):
         """Ends live mode after all checks, and makes the result that the run acts on a layer."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack, undo_steps
+from ..blender import mesh_arrays, modifier_stack, references
 from ..blender.actions import varies
 from ..blender.language import translated
 from ..blender.object_references import settings_of
@@ -134,7 +134,7 @@ def make_way(source, kind):
             break
         field, by = modifier_stack.find(source), settings_of(source).moved_by
         gone.append(field and (motion.snapshot(source), by, inputs.get(field, "Factor")))
-        with undo_steps.unused_kept():  # put_back() may take them again, without a step of undo
+        with references.unused_kept():  # put_back() may take them again, without a step of undo
             motion.discard(source)
             uncover(source, baked=True)
     return Way(gone=tuple(gone))

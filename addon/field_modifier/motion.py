@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack, splat_layouts, undo_steps
+from ..blender import mesh_arrays, modifier_stack, references, splat_layouts
 from ..blender.object_references import settings_of
 from ..blender.point_data import points_of
 from ..blender.references import remove_mesh_object, remove_node_modifier, remove_unused_group
@@ -61,7 +61,7 @@ def write_silenced(source, noted):
 # Offsets are attributes of the mesh itself, or of a helper mesh in no scene if earlier modifiers make the
 # vertices, or if the mesh is linked or shared with other objects. While an object is live it has a helper
 # in any case, empty if it is not needed: it may be needed between two steps of undo
-# (blender/undo_steps.py).
+# (blender/references.py).
 
 written = set()  # session_uids of objects that the add-on itself has moved since the last depsgraph update
 
@@ -126,7 +126,7 @@ def lies_on_mesh(source):
 
 def add(source, normals, splats):
     """A new field modifier at its place."""
-    undo_steps.refuse_new(source)
+    references.refuse_new(source)
     index = modifier_stack.place(source)
     modifier = source.modifiers.new(FIELD_MODIFIER, "NODES")
     modifier.node_group = node_group.find_or_make(normals, splats)
@@ -137,7 +137,7 @@ def add(source, normals, splats):
 def choose_group(modifier, normals, splats):
     """Replaces the node group if the domain of the normals has changed."""
     if not node_group.is_for(modifier, normals, splats):
-        undo_steps.refuse_new(modifier.id_data)
+        references.refuse_new(modifier.id_data)
         take_group(modifier, node_group.find_or_make(normals, splats))
 
 
@@ -158,11 +158,11 @@ def take_helper(source, modifier):
     """Gives the modifier a helper of its own, unless it has one; between two steps of undo also one that it
     shares with a duplicate will do. Returns it."""
     helper = inputs.get(modifier, "Offsets")
-    if helper is not None and helper.library is None and (users_of(helper) == 1 or undo_steps.is_between):
+    if helper is not None and helper.library is None and (users_of(helper) == 1 or references.is_between):
         return helper
     own = unused_helper(source)
     if own is None:
-        undo_steps.refuse_new(source)
+        references.refuse_new(source)
         mesh = bpy.data.meshes.new(f"{source.name}{HELPER_SUFFIX}")
         own = bpy.data.objects.new(mesh.name, mesh)
     if helper is not None:
@@ -192,7 +192,7 @@ def leave_helper(modifier, live=False):
     if users_of(helper) > 1 or helper.library is not None:
         if len(helper.data.vertices):
             inputs.put(modifier, "Offsets", None)
-    elif live or undo_steps.keeps_unused:
+    elif live or references.keeps_unused:
         empty(helper)
     else:
         inputs.put(modifier, "Offsets", None)
@@ -232,7 +232,7 @@ def users_of(helper):
 
 
 def discard_helper(helper):
-    if users_of(helper) == 0 and helper.library is None and not undo_steps.keeps_unused:
+    if users_of(helper) == 0 and helper.library is None and not references.keeps_unused:
         remove_mesh_object(helper)
 
 

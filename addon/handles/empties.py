@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Empties of handles: made, named, found, chosen in the list, and deleted."""
+"""Empties of handles: made, named, found, chosen in the list, scaled, and deleted."""
 
 import re
 
@@ -10,10 +10,9 @@ from mathutils import Matrix, Vector
 from ..blender import former_defaults, mesh_arrays, modifier_stack, vertex_groups
 from ..blender.evaluation import is_driven
 from ..blender.language import translated
-from ..blender.object_references import in_scene, owner_of, settings_of
+from ..blender.object_references import choose_row, in_scene, owner_of, settings_of
 from ..blender.point_data import selection_of
 from ..blender.property_definitions import from_single_precision
-from ..blender.selection import choose_row
 from ..core.errors import UserError, refuse
 from ..core.geometry.handles import far_handle, solve_handle
 from ..core.geometry.spaces import Space, inverse, space_of, transform
@@ -21,6 +20,8 @@ from ..core.runtime.jobs import run_to_completion
 from ..names import HANDLES, HANDLES_MARK
 from . import movers, symmetry
 from .movers import box_now, current_box, has_mover, matrix_of, name_of
+
+# Empties of handles: made, named, found, chosen in the list, and deleted.
 
 # Names and colours of handles.
 
@@ -100,7 +101,7 @@ def is_colour(one, other):
     return max(abs(a - b) for a, b in zip(one, other, strict=True)) < 1e-3
 
 
-# Makes a handle's row active when its Empty becomes active; blender/selection.py does the reverse.
+# Makes a handle's row active when its Empty becomes active; blender/object_references.py does the reverse.
 
 seen_active = {}  # "active": session_uid of the active object at the last check
 
@@ -383,3 +384,26 @@ def remove(source, index):
         settings_of(empty).handle_of = None
     settings.handles.remove(index)
     choose_row(settings, max(0, min(settings.active_handle, len(settings.handles) - 1)))
+
+
+# Handles that are scaled without Allow Scale.
+
+LEAST_SCALE = 1e-3  # relative difference from the rest size above which a box counts as scaled
+
+
+def ignored_scale(source):
+    """UserError that names the handles whose scale is ignored; else None."""
+    names = [movers.name_of(entry) for entry in used(source) if is_scale_ignored(source, entry)]
+    if not names:
+        return None
+    return UserError("{names} is scaled, which counts only with Allow Scale", names=", ".join(names))
+
+
+def is_scale_ignored(source, entry):
+    if entry.allow_scale or entry.kind == "POINT":
+        return False
+    rest, now = rest_box(source, entry)[:3, :3], movers.box_now(entry)[:3, :3]
+    if not np.isfinite(now).all() or abs(np.linalg.det(rest)) == 0.0:
+        return False  # refused elsewhere
+    stretches = np.linalg.svd(now @ np.linalg.inv(rest), compute_uv=False)
+    return bool(np.abs(stretches - 1.0).max() > LEAST_SCALE)

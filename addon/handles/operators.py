@@ -3,9 +3,8 @@ import bpy
 
 from ..blender import vertex_groups
 from ..blender.language import translated
-from ..blender.object_references import settings_of, source_of
+from ..blender.object_references import select_alone, settings_of, source_of
 from ..blender.property_definitions import choice, flag, text
-from ..blender.selection import select_alone
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..core.geometry.handles import nothing_held

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import bpy
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack, undo_steps
+from ..blender import mesh_arrays, modifier_stack, references
 from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..core.errors import UserError
 from ..field_modifier import cache_modifier, motion
@@ -25,7 +25,7 @@ class LiveObject:
     in_place, arrays = False, ()
 
     def __init__(self, context, source, surface):
-        undo_steps.refuse_new(source)
+        references.refuse_new(source)
         mesh = result_objects.shown_mesh(context, source, len(surface.local))
         active, selected = context.view_layer.objects.active, list(context.selected_objects)
         item = result_objects.show(context, source, LIVE, LIVE, mesh, {"output": LIVE}, select=False)

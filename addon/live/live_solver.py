@@ -15,8 +15,7 @@ from ..core.runtime import native
 from ..core.runtime.threads import start_thread
 from ..handles import symmetry
 from ..results import placement
-from ..solver.frame_solver import FrameSolver
-from ..solver.setup import SolverSetup, energy_weights, sampled
+from ..solver.frame_solver import FrameSolver, SolverSetup, energy_weights, sampled
 from ..surface.source_surface import read_surface
 
 # Sets a solver up before live mode starts, for the object that a tool names as the next one.

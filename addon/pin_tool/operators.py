@@ -6,9 +6,8 @@ import numpy as np
 
 from ..blender import host
 from ..blender.host import redraw
-from ..blender.object_references import owner_of
+from ..blender.object_references import owner_of, select_alone
 from ..blender.property_definitions import flag, number
-from ..blender.selection import select_alone
 from ..blender.source_operator import ReportingOperator
 from ..core.errors import UserError
 from ..core.runtime import native

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..blender import modifier_stack, object_references, selection
+from ..blender import modifier_stack, object_references
 from ..blender.language import translated
 from ..blender.object_references import owner_of, settings_of
 from ..blender.property_definitions import listeners
@@ -165,10 +165,10 @@ def choose(context, empty):
     index, is_new = empties.find(source, empty), False
     shown = source if source.visible_get() else empty  # the shape may be another object's
     if layer.objects.active != shown or not shown.select_get():
-        selection.select_alone(context, shown)
+        object_references.select_alone(context, shown)
         is_new = True
     if settings_of(source).active_handle != index:
-        selection.choose_row(settings_of(source), index)
+        object_references.choose_row(settings_of(source), index)
         is_new = True
     return is_new
 

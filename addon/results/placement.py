@@ -21,7 +21,7 @@ from ..core.geometry.edges import Topology
 from ..core.geometry.spaces import space_of
 from ..field_modifier import field_nodes, layers, motion
 from ..handles import empties
-from ..handles.following import Followers
+from ..handles.held_counts import Followers
 from ..names import REPORT
 from . import result_objects
 

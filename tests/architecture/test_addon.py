@@ -21,7 +21,6 @@ ORDER = [
     "stiffness",
     "surface",
     "results",
-    "viewport",
     "solver",
     "contact",
     "live",
@@ -72,11 +71,11 @@ ENDED_ELSEWHERE = {  # state that the lifecycle's STATE does not list, and why
     "lifecycle._begun": "lifecycle.unregister itself",
     "lifecycle._drawn": "lifecycle.unregister itself",
     "host._started": "timers.clear, by STATE, which lists the module",
-    "selection.rows": "a flag that is down whenever no row is being chosen",
+    "object_references.rows": "a flag that is down whenever no row is being chosen",
     "native._state": "the library, which a process loads once",
-    "undo_steps.is_between": "set within a context manager alone",
-    "undo_steps.keeps_unused": "set within a context manager alone",
-    "undo_steps.pushed": "a count of steps that only rises",
+    "references.is_between": "set within a context manager alone",
+    "references.keeps_unused": "set within a context manager alone",
+    "references.pushed": "a count of steps that only rises",
     "property_definitions.listeners": "filled while modules are imported, constant afterwards",
 }
 
@@ -133,7 +132,6 @@ def test_nothing_but_the_contents_page_needs_operators_or_panels():
 
 def test_properties_import_only_choices_and_tables():
     allowed = ("core.settings", "names", "blender.property_definitions", "blender.object_references")
-    allowed += ("blender.selection",)
     sources = [path for path in modules() if path.stem == "properties" or path.parent.name == "properties"]
     wrong = [
         f"{name(path)} imports {one}"

@@ -20,10 +20,10 @@ if IN_BLENDER:
     from addon.blender.object_references import settings_of
     from addon.core.runtime import jobs
     from addon.handles import native_handles, symmetry
+    from addon.handles.overlays import CIRCLE_ENDS, box_lines, ghosts, segments
     from addon.live import sessions
     from addon.pin_tool import drag, drawing
     from addon.pin_tool.operators import reach_steps
-    from addon.viewport.overlays import CIRCLE_ENDS, box_lines, ghosts, segments
 
 pytestmark = pytest.mark.in_blender
 

@@ -19,12 +19,11 @@ if IN_BLENDER:
     from addon import lifecycle
     from addon.blender import host, icons
     from addon.core.runtime import jobs, native, threads
-    from addon.handles import held_counts
+    from addon.handles import held_counts, overlays
     from addon.jobs.display import display
     from addon.live import sessions
     from addon.live.live_solver import prefetch
     from addon.pin_tool import drag, hover, tool
-    from addon.viewport import overlays
 
 pytestmark = pytest.mark.in_blender
 

@@ -28,7 +28,7 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.field_modifier import field_nodes, inputs
     from addon.poses import applying
-    from addon.solver import setup
+    from addon.solver import frame_solver
     from addon.surface import source_surface
 
 pytestmark = pytest.mark.in_blender
@@ -471,7 +471,7 @@ def body(curl=0.0):
 
 @pytest.mark.parametrize(("curl", "count"), [(0.0, 50_000), (2.4, 2_000)])
 def test_the_group_is_the_librarys_field(curl, count):
-    setup.SAMPLES = 6000  # so dense that the ends of the curl are told apart
+    frame_solver.SAMPLES = 6000  # so dense that the ends of the curl are told apart
     bar, moving = body(curl)
     place = Matrix.Translation((3, 0, 1)) @ Matrix.Rotation(0.7, 4, "Z") @ Matrix.Diagonal((2, 0.5, 1, 1))
     points = cloud(count, place)

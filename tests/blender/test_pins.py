@@ -23,7 +23,7 @@ if IN_BLENDER:
     from addon.live import sessions
     from addon.live.live_solver import prefetch
     from addon.pin_tool import drag, hints, hover, pins, places, screen
-    from addon.solver import setup
+    from addon.solver import frame_solver
 
 pytestmark = pytest.mark.in_blender
 
@@ -524,7 +524,7 @@ ROUNDS = 2
 
 
 def test_rounds_of_undo_and_redo_are_exact():
-    setup.SAMPLES = 500
+    frame_solver.SAMPLES = 500
     scenes.bar()
     bpy.context.preferences.edit.use_global_undo = True
     states = []

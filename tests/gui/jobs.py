@@ -10,7 +10,7 @@ from stage import until, until_idle
 from support.blender import scenes
 
 from addon.core.runtime import jobs
-from addon.viewport import overlays
+from addon.handles import overlays
 
 SIDEBAR = (1150, 700)  # a spot over it
 LONG = {**scenes.NEW, "iterations": 200000}

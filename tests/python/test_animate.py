@@ -20,8 +20,7 @@ from support.geometry.meshes import LEFT, RIGHT, sphere, turned
 from support.programs.cli import process, run
 
 import arapfields as af
-from arapfields._files import whole_file
-from arapfields._locks import lock
+from arapfields._files import lock, whole_file
 from arapfields._native import InvalidInput
 from arapfields.cli.animate import STEPS, TOLERANCE
 from arapfields.cli.files import read_mesh

@@ -15,7 +15,7 @@ from support.geometry.meshes import torus
 from support.tolerances import BUSY_SLOWDOWN
 
 import arapfields as af
-from arapfields._locks import lock, unlock
+from arapfields._files import lock, unlock
 
 # The library's own threads: a number for each call, the same results for all; libtorch's are left alone.
 
@@ -356,7 +356,7 @@ def test_daemon_threads_in_numpys_copies_leave_the_exit_code():
 THREADS, ROUNDS = 8, 100
 LOCK_ALL = """
 import sys
-from arapfields._locks import lock
+from arapfields._files import lock
 file = open(sys.argv[1], "ab")
 for byte in range(int(sys.argv[2])):
     lock(file, byte, wait=False)

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from addon.blender import undo_steps
+from addon.blender import references
 from addon.blender.object_references import settings_of
 from addon.live import sessions
 from tests.fuzz.walk import walk_scenes
@@ -45,7 +45,7 @@ class Shapes:
 
     def step(self, name, seed):
         """Takes a step, after which the rule holds; returns what was done, None if nothing can be."""
-        before, pushed = self.history[self.position], undo_steps.pushed
+        before, pushed = self.history[self.position], references.pushed
         at_end = self.position + 1 == len(self.history)
         if (name == "undo" and self.position == 0) or (name == "redo" and at_end):
             return None
@@ -67,7 +67,7 @@ class Shapes:
             walk_scenes.settle()
             held = self.check(name, said, self.steps.old, before)
             del self.history[self.position + 1 :]
-            between = [None] * (undo_steps.pushed - pushed)  # where live mode has ended
+            between = [None] * (references.pushed - pushed)  # where live mode has ended
             self.history = [*self.history, *between, self.note(held)][-40:]
             self.position = len(self.history) - 1
         strays = walk_scenes.strays()
@@ -158,9 +158,9 @@ class All:
         if (name == "undo" and self.position == 0) or (name == "redo" and at_end):
             return None
         may_move = any(settings_of(item).result in ("REPLACE", "KEY") for item in walk_scenes.sources())
-        points, was_live, pushed = walk_scenes.rest(), dict(sessions.live), undo_steps.pushed
+        points, was_live, pushed = walk_scenes.rest(), dict(sessions.live), references.pushed
         said = self.steps.take(name, seed)
-        if said is None and pushed == undo_steps.pushed:
+        if said is None and pushed == references.pushed:
             if self.history[self.position] is not None:
                 walk_scenes.settle()
                 require_same_pictures(self.history[self.position], walk_scenes.picture(), "what is refused")
@@ -179,7 +179,7 @@ class All:
             bpy.ops.ed.undo_push(message=name)
             walk_scenes.settle()
             del self.history[self.position + 1 :]
-            between = [None] * (undo_steps.pushed - pushed)  # where live mode has ended
+            between = [None] * (references.pushed - pushed)  # where live mode has ended
             self.history = [*self.history, *between, walk_scenes.picture()][-40:]
             self.position = len(self.history) - 1
             if name == "register":  # live mode ends with the extension, and does not come back by undo

@@ -14,7 +14,7 @@ from addon.blender.object_references import owner_of, settings_of
 from addon.core.runtime.jobs import run_to_completion
 from addon.live import sessions
 from addon.results import placement
-from addon.solver import frame_solver, setup
+from addon.solver import frame_solver
 from addon.solver.frame_solver import FrameSolver
 from addon.solver.source_reader import SourceReader
 
@@ -199,7 +199,7 @@ FEW = {"coarse_centers": 10, "fine_centers": 40, "samples": 400}
 
 def few_centers():
     """Solves take milliseconds, here and in what the walk compares them with; returns what ends that."""
-    places = (setup, "SAMPLES"), (user_preferences, "machine_options"), (frame_solver, "STYLE")
+    places = (frame_solver, "SAMPLES"), (user_preferences, "machine_options"), (frame_solver, "STYLE")
     places += ((frame_solver, "options_of"),)
     before = [getattr(owner, name) for owner, name in places]
     label, tip, options = frame_solver.STYLE
@@ -287,7 +287,7 @@ def fresh_shape(source, kind):
     settings = settings_of(source)
     reader = SourceReader(bpy.context, source, kind, placement.in_place(settings.output, settings.result))
     run_to_completion(reader.read_setup(bpy.context))
-    solver = FrameSolver(setup.sampled(reader.setup), reader.carrying)
+    solver = FrameSolver(frame_solver.sampled(reader.setup), reader.carrying)
     return solver.solve_from_rest(reader.request(bpy.context)).points
 
 

@@ -10,7 +10,7 @@ from mathutils import Matrix
 from ..blender import user_preferences
 from ..blender.object_references import settings_of, source_of
 from ..core.geometry.edges import cluster_vertices, vertex_normals
-from ..handles import empties, movers, symmetry
+from . import empties, movers, symmetry
 
 # Previews of running solves, drawn as an overlay, never stored in the file.
 
