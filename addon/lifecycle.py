@@ -12,29 +12,28 @@ from .blender.host import has_window
 from .blender.language import translated
 from .carried import carrying
 from .core.runtime import jobs, threads
-from .deform import first_result
-from .field_modifier import copies, motion
-from .handles import applied_transforms, held_counts, left_behind, row_selection, symmetry
-from .jobs import modal
+from .deform import solve_job
+from .field_modifier import layers, motion
+from .handles import applied_transforms, empties, held_counts, left_behind, overlays, symmetry
+from .jobs import job_operator
 from .jobs.display import display
-from .live import recovery, rendering, sessions, stored, touching
-from .live.prefetch import prefetch
+from .live import recovery, sessions, stored
+from .live.live_solver import prefetch
 from .pin_tool import drawing as pin_drawing
 from .pin_tool import tool
 from .pin_tool.hints import status
 from .pin_tool.hover import hover
 from .poses import applying
-from .solver import style_object
-from .surface import surface_fit
-from .viewport import handle_boxes, previews
+from .solver import style_settings
+from .surface import source_surface
 from .wrap import landmark_tools, landmarks
 
 
 @persistent
 def before_load(*_):
     """The file is about to go: whatever works on it ends, and nothing of it is applied."""
-    passing = (jobs.board, held_counts.pending, surface_fit.changed, row_selection.seen, prefetch)
-    for state in (*passing, applying.solved, first_result.steps, left_behind.seen, stored.shapes):
+    passing = (jobs.board, held_counts.pending, source_surface.changed, empties.seen_active, prefetch)
+    for state in (*passing, applying.solved, solve_job.steps, left_behind.seen, stored.shapes):
         state.clear()
     applied_transforms.seen.clear()
     applied_transforms.followed.clear()
@@ -64,7 +63,7 @@ def before_save(*_):
 def after_load(*_):
     former_defaults.keep()
     hover.clear()
-    first_result.steps.recover()
+    solve_job.steps.recover()
     recovery.after_load()
 
 
@@ -72,7 +71,7 @@ def after_load(*_):
 def after_restore(*_):
     """A step was undone or redone."""
     hover.clear()
-    first_result.steps.recover()
+    solve_job.steps.recover()
     applied_transforms.after_undo()
     recovery.after_undo()
 
@@ -80,19 +79,19 @@ def after_restore(*_):
 @persistent
 def after_update(scene, depsgraph):
     if not modifier_stack.is_stage(scene):
-        surface_fit.watch(depsgraph)
+        source_surface.watch(depsgraph)
         if not sessions.live.is_rendering:
             applied_transforms.follow(depsgraph)
         sessions.watch(depsgraph)
         motion.written.clear()
         if not sessions.live.is_rendering:
-            row_selection.follow(bpy.context)
+            empties.follow_active(bpy.context)
             left_behind.follow(bpy.context)
             active = getattr(bpy.context, "active_object", None)
             if active is not None:
                 recovery.disown(active)
                 if active.library is None:
-                    copies.switch_off(active)
+                    layers.switch_copies_off(active)
 
 
 @persistent
@@ -108,9 +107,9 @@ def after_render(*_):
 @persistent
 def after_frame(scene, depsgraph):
     if sessions.live.is_rendering:
-        rendering.follow_frame(depsgraph)
+        recovery.follow_frame(depsgraph)
     elif sessions.live and not modifier_stack.is_stage(scene):
-        rendering.show_frame()
+        recovery.show_frame()
 
 
 HANDLERS = {  # of bpy.app.handlers
@@ -128,9 +127,10 @@ HANDLERS = {  # of bpy.app.handlers
     "frame_change_post": after_frame,
 }
 DRAWINGS = (  # over every 3D viewport
-    *((previews.draw, "POST_VIEW"), (handle_boxes.draw, "POST_VIEW"), (pin_drawing.draw, "POST_VIEW")),
-    *((touching.draw, "POST_VIEW"), (landmark_tools.draw, "POST_PIXEL")),
-    *((pin_drawing.draw_label, "POST_PIXEL"), (first_run.draw, "POST_PIXEL")),
+    *((overlays.draw_previews, "POST_VIEW"), (overlays.draw_handle_boxes, "POST_VIEW")),
+    *((pin_drawing.draw, "POST_VIEW"), (recovery.draw_touching, "POST_VIEW")),
+    *((landmark_tools.draw, "POST_PIXEL"), (pin_drawing.draw_label, "POST_PIXEL")),
+    (first_run.draw, "POST_PIXEL"),
 )
 PARTS = (  # what begins with the extension, and how it ends
     (icons.load, icons.clear),
@@ -144,29 +144,11 @@ PARTS = (  # what begins with the extension, and how it ends
 )
 # What may be there when the extension is disabled, in the order in which it ends; each has clear().
 # Timers are started by blender/host.py, threads by core/runtime/threads.py.
-STATE = (modal.runs, jobs.board, display, sessions.live, held_counts.pending, surface_fit.changed)
-STATE += (
-    motion.written,
-    carrying.written,
-    hover,
-    prefetch,
-    applying.solved,
-    previews.shown,
-    first_result.steps,
-)
-STATE += (
-    row_selection.seen,
-    host,
-    style_object.cache,
-    left_behind.seen,
-    stored.shapes,
-    applied_transforms.seen,
-    applied_transforms.followed,
-    status,
-    symmetry.planes,
-    first_run.welcome,
-    landmarks.nearest,
-)
+STATE = (job_operator.runs, jobs.board, display, sessions.live, held_counts.pending, source_surface.changed)
+STATE += (motion.written, carrying.written, hover, prefetch, applying.solved, overlays.shown)
+STATE += (solve_job.steps, empties.seen_active, host, style_settings.style_cache, left_behind.seen)
+STATE += (stored.shapes, applied_transforms.seen, applied_transforms.followed, status, symmetry.planes)
+STATE += (first_run.welcome, landmarks.nearest)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread
 

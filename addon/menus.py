@@ -4,7 +4,7 @@
 import bpy
 
 from .blender.object_references import source_of
-from .jobs import status_bar
+from .jobs import display
 from .live import sessions
 from .names import Op
 
@@ -64,7 +64,7 @@ def draw_in_empties(menu, context):
 # Blender 4.2 has no menu of its own for Empties.
 EMPTIES = "VIEW3D_MT_empty_add" if hasattr(bpy.types, "VIEW3D_MT_empty_add") else "VIEW3D_MT_add"
 PLACES = {  # of bpy.types: what is drawn at the end
-    "STATUSBAR_HT_header": status_bar.draw,
+    "STATUSBAR_HT_header": display.draw,
     "VIEW3D_MT_object": draw_in_object_menu,
     EMPTIES: draw_in_empties,
 }

@@ -4,9 +4,8 @@
 import bpy
 
 from .animation.properties import ARAPFIELDS_PG_bake
-from .blender.object_references import owner_of, settings_of
+from .blender.object_references import owner_of, row_chosen, settings_of
 from .blender.property_definitions import choice, collection, flag, integer, number, pointer, tells, text
-from .blender.selection import row_chosen
 from .contact.properties import ARAPFIELDS_PG_contact
 from .core.settings.choices import CARRYING, NORMALS
 from .handles.properties import ARAPFIELDS_PG_handle

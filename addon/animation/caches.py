@@ -15,7 +15,7 @@ from ..blender import mesh_arrays, modifier_stack
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.point_data import points_of
-from ..carried import played_points
+from ..carried import points
 from ..core.errors import UserError, as_user_error
 from ..core.runtime import native
 from ..core.runtime.jobs import Pause
@@ -199,7 +199,7 @@ def same_place(path):
 
 def plays(item, path):
     """Whether an object plays the cache at that path."""
-    played = played_points.find(item)
+    played = points.find(item)
     if played is not None:
         item = inputs.get(played, "Points") or item
     return any(

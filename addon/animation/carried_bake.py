@@ -13,7 +13,7 @@ import bpy
 from ..blender import modifier_stack, references
 from ..blender.actions import key_at
 from ..blender.language import translated
-from ..carried import played_points
+from ..carried import points
 from ..carried.carriers import MeshCarrier
 from ..carried.carrying import carrier_class, find
 from ..carried.points import (
@@ -30,9 +30,9 @@ from ..carried.transforms import BAKED_GROUP, BonesCarrier, PoseCarrier, Transfo
 from ..core.errors import UserError, as_user_error
 from ..core.runtime.jobs import Pause
 from ..field_modifier import cache_modifier
-from ..results import result_objects, visibility
+from ..results import placement, result_objects
+from ..solver.frame_range import playing
 from .caches import CacheFile, plain
-from .frames import playing
 
 
 class CarriedBake:
@@ -124,7 +124,7 @@ class CarriedBake:
                 elif len(self.shapes.get(carried, ())) != self.frames.count:
                     raise UserError("{name} was not there at every frame", item)
                 elif isinstance(carried.carrier, AttributeCarrier):
-                    played = played_points.play(item, carried.carrier.points, carried.carrier.counts)
+                    played = points.play(item, carried.carrier.points, carried.carrier.counts)
                     yield from self.add_frames(carried, played)
                 elif isinstance(carried.carrier, MeshCarrier):
                     yield from self.add_object(context, carried, item)
@@ -158,7 +158,7 @@ class CarriedBake:
     def play(self, carried, item):
         self.caches[carried].commit()
         if isinstance(carried.carrier, AttributeCarrier):
-            item = played_points.play(item, carried.carrier.points, carried.carrier.counts)
+            item = points.play(item, carried.carrier.points, carried.carrier.counts)
         self.caches[carried].play_on(item)
 
     def add_object(self, context, carried, item):
@@ -173,7 +173,7 @@ class CarriedBake:
         own = {source: result_objects.existing(context, source, "BAKE", "BAKE")}
         references.remap(references.parts_of(baked), own)
         yield from self.add_frames(carried, baked)
-        visibility.show_alone(item, baked)
+        placement.show_alone(item, baked)
 
     def add_frames(self, carried, item):
         frames = [plain(frame) for frame in self.frames]
@@ -248,7 +248,7 @@ def remove(item, entry):
     if item.type == "MESH" and modifier_stack.find_cache(item) is not None:
         cache_modifier.remove(item)
     if kind is AttributeCarrier:
-        played_points.remove(item)
+        points.remove(item)
     elif kind is KeyCarrier:
         forget_baked_keys(item)
     elif kind is TransformCarrier:

@@ -25,10 +25,11 @@ from ..core.settings.choices import EXPORT_FORMATS
 from ..field_modifier import cache_modifier
 from ..names import CONTEXT, Op
 from ..results import result_objects
-from . import caches, frames
+from ..solver import frame_range
+from ..solver.frame_range import playing
+from . import caches
 from .bake_job import BakeOperator, arguments, effective_kind, refusal_of
 from .caches import plain, size_text
-from .frames import playing
 from .object_bake import ObjectBake
 from .properties import settings
 
@@ -304,7 +305,7 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         active, sources = source_of(context), self.sources(context)
         (path,) = self.places(context)
         kinds = [(source, effective_kind(source, self)) for source in sources]
-        self.frames = frames.choose(context, kinds, self.values(active))
+        self.frames = frame_range.choose_frames(context, kinds, self.values(active))
         self.items = [ObjectReference(source) for source in sources]
         unsolved = [source for source in sources if self.is_unsolved(source)]
         return (yield from self.plan(context, job, path, unsolved))

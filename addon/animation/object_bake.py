@@ -14,14 +14,13 @@ from ..blender.actions import varies
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError, as_user_error
-from ..field_modifier import unseen
+from ..field_modifier import layers
 from ..handles import empties
 from ..live import sessions
-from ..results import placement, result_objects, visibility
+from ..results import placement, result_objects
 from ..solver import contact, secondary_motion
-from ..solver.frame_solver import FrameSolver
+from ..solver.frame_solver import FrameSolver, sampled
 from ..solver.secondary_motion import Moment, Poses, Simulation
-from ..solver.setup import sampled
 from ..solver.source_reader import SourceChanged, SourceReader, has_motion_before
 from .caches import CacheFile, ShapeKeys, cache_beside, keys_weight, size_text
 from .carried_bake import CarriedBake
@@ -285,9 +284,9 @@ class ObjectBake:
         if self.in_place:
             carried = [one.reference.find() for one in self.carried.carrying.objects]
             for item in (source, *(one for one in carried if one is not None and one.type == "MESH")):
-                self.carried.warnings += unseen.standing(item)
+                self.carried.warnings += layers.unmoved_modifiers(item)
         player = source if self.in_place else self.new_object(context, source, self.mesh(context, source))
-        visibility.show_alone(source, player)
+        placement.show_alone(source, player)
         self.store.play_on(player)
         digest, faces = mesh_arrays.fingerprint(player.data)
         record = {"mesh": digest.hex(), "faces": faces, "start": frames.start, "step": frames.step}
@@ -322,7 +321,7 @@ class ObjectBake:
         item = self.new_object(context, source, self.store.item.data)
         self.store.forget()
         context.scene.frame_set(context.scene.frame_current)  # else the last key stays on
-        visibility.show_alone(source, item)
+        placement.show_alone(source, item)
         return translated(
             "{count} frames baked into shape keys of {size}",
             count=self.frames.count,

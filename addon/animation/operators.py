@@ -9,22 +9,20 @@ from ..blender.object_references import owner_of, settings_of, source_of
 from ..blender.property_definitions import effective_value, path_text
 from ..blender.source_operator import SourceOperator
 from ..blender.splat_layouts import holds_splats
-from ..carried import carrying, refusals
+from ..carried import carrying
 from ..carried.carriers import MeshCarrier
 from ..carried.carrying import carrier_class
 from ..carried.points import AttributeCarrier
 from ..core.errors import UserError, refuse
-from ..field_modifier import cache_modifier, inputs
-from ..field_nodes import helper, node_group
+from ..field_modifier import cache_modifier, field_nodes, inputs
 from ..live import sessions
 from ..names import FIELD_NODES
 from ..poses import applying
 from . import caches, carried_bake, splat_export
-from .bake_job import BakeOperator, effective_kind, refusal_of
+from .bake_job import BakeOperator, WrapBake, effective_kind, frames_of, refusal_of, scans_in
 from .object_bake import ObjectBake
 from .properties import folder, settings
 from .splat_export import SplatBake
-from .wrap_bake import WrapBake, frames_of, scans_in
 
 
 def cached_with(source):
@@ -207,21 +205,21 @@ curves and what changes its topology as well. They follow each further solve"""
 
     def change(self, context, source):
         others = [item for item in context.selected_objects if item != source and owner_of(item) != source]
-        if not others and helper.of(source) is None:
+        if not others and field_nodes.of(source) is None:
             raise UserError("Select the objects to move by nodes as well")
         for item in others:
             require_free(source, item)
         is_live, rows = sessions.is_live(source), None
         if not is_live:
             pose = applying.solved_pose(context, source)
-            rows = helper.rows_of(pose.field, pose.local_to_solve)
-        carrier = helper.of(source) or helper.make(source)
+            rows = field_nodes.rows_of(pose.field, pose.local_to_solve)
+        carrier = field_nodes.of(source) or field_nodes.make(source)
         for item in others:
             follow(item, carrier)
         if is_live:
             sessions.settle(context, source.session_uid)
         else:
-            helper.write(carrier, rows)
+            field_nodes.write(carrier, rows)
         count = len(bpy.data.user_map(subset=[carrier])[carrier] - {source})
         return translated("Objects that move by the field of {name}: {count}", count=count, name=source.name)
 
@@ -232,7 +230,7 @@ def require_free(source, item):
         raise UserError("{name} is linked from another file; make it local to carry it", item)
     if not hasattr(item.data, "attributes") and item.type not in ("CURVE", "FONT", "SURFACE"):
         raise UserError("{name} has no geometry that nodes could move", item)
-    refuse(refusals.of_splats(item))
+    refuse(carrying.of_splats(item))
     if carrying.find(source, item) is not None:
         raise UserError("{name} moves with {other} already", item, other=source.name)
 
@@ -243,7 +241,7 @@ def follow(item, carrier):
         return
     index = modifier_stack.end(list(item.modifiers))
     modifier = item.modifiers.new("ARAP Field", "NODES")
-    modifier.node_group = node_group.find_or_make()
+    modifier.node_group = field_nodes.find_or_make()
     inputs.put(modifier, "Field", carrier)
     item.modifiers.move(item.modifiers.find(modifier.name), index)
 

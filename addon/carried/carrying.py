@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All carried objects of a source during a session or job: read, moved on a worker, shown, restored."""
+"""A source's carried objects during a session or job: refused or read, moved on a worker, shown, restored."""
 
 import contextlib
 from dataclasses import dataclass, replace
@@ -7,18 +7,110 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack
-from ..blender.evaluation import depsgraph_of
-from ..blender.object_references import ObjectReference, settings_of
+from ..blender.evaluation import depsgraph_of, with_ancestors
+from ..blender.modifier_stack import handle_rigs, is_posing
+from ..blender.object_references import ObjectReference, in_scene, settings_of
+from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import facing, inverse, transform, unflattened
-from ..field_modifier import masks, motion
-from ..field_nodes import helper
-from . import refusals
+from ..field_modifier import field_nodes, inputs, motion
 from .carriers import MeshCarrier
 from .points import AttributeCarrier, KeyCarrier
 from .rest_bones import above_field
-from .transforms import BonesCarrier, TransformCarrier, base_kind_of
-from .world_matrices import hangs_on, world_matrices
+from .transforms import BonesCarrier, TransformCarrier, base_kind_of, constrained_to, hangs_on, world_matrices
+
+# UserErrors that say why an object is not carried.
+
+BINDING = {"LATTICE": "object", "CURVE": "object", "HOOK": "object"}  # modifiers that follow another object
+BINDING |= {"MESH_DEFORM": "object", "SURFACE_DEFORM": "target"}
+
+
+def bound_to(item):
+    """The objects that shown modifiers of an object have it follow, None among them."""
+    shown = [modifier for modifier in item.modifiers if modifier.show_viewport]
+    return [getattr(modifier, BINDING[modifier.type]) for modifier in shown if modifier.type in BINDING]
+
+
+def of_entry(source, entry):
+    """UserError that says why an entry of a source's list is left out now; else None."""
+    item = entry.item
+    if not in_scene(item):
+        return UserError("{name}, which {source} carries, was deleted", entry, source=source.name)
+    reason = of_item(source, item)
+    if reason is not None:
+        return reason
+    if item.mode == "EDIT":
+        return UserError("{name} is in Edit Mode; leave it first", item)
+    if not item.visible_get():
+        return UserError("{name} is hidden; it is not carried", item)
+    return None
+
+
+def of_item(source, item):
+    """UserError that says why an object cannot be carried at all; else None."""
+    if item == source:
+        return UserError("{name} cannot carry itself", item)
+    if item.library is not None:
+        return UserError("{name} is linked from another file; make it local to carry it", item)
+    settings = settings_of(item)
+    if len(settings.handles):
+        return UserError("{name} has handles of its own; it is not carried", item)
+    if reason := of_splats(item):
+        return reason
+    if settings.handle_of == source and any(e.empty == item for e in settings_of(source).handles):
+        return UserError("{name} is a handle of {source} itself", item, source=source.name)
+    rigs = handle_rigs(source)
+    if item in rigs:
+        return UserError("The bones of {name} are handles of {source}", item, source=source.name)
+    if moves(item, source):
+        return UserError("{name} moves {source} already; it is not carried", item, source=source.name)
+    if constrained_to(item, [*rigs, *above_field(source)]):
+        return UserError("{name} follows the armature by a constraint; it is not carried", item)
+    return moves_anyway(source, item)
+
+
+def of_splats(item):
+    """UserError if an object holds splats, which another object's field cannot move; else None."""
+    return (
+        UserError("{name} holds splats; only handles of its own turn them", item)
+        if holds_splats(item)
+        else None
+    )
+
+
+def moves_anyway(source, item):
+    """UserError if an object already follows another one that the field moves; else None."""
+    carried = [entry.item for entry in settings_of(source).carried if entry.item not in (None, item)]
+    for parent in with_ancestors(item.parent):
+        if parent in carried and is_moved_whole(source, parent):
+            return moves_with(item, parent)
+    for target in bound_to(item):
+        if target is not None and target in [source, *carried]:
+            return moves_with(item, target)
+    return None
+
+
+def moves(item, source):
+    """Whether an object moves the source: what the field does to it would reach the source once more."""
+    posing = [one.object for one in source.modifiers if is_posing(source, one) and one.show_viewport]
+    above = [*with_ancestors(source.parent), *posing, *bound_to(source)]
+    return item in above or constrained_to(source, [item])
+
+
+def is_moved_whole(source, item):
+    """Whether a carried object moves as a whole, with all of its children."""
+    way = next(entry.way for entry in settings_of(source).carried if entry.item == item)
+    return way == "RIGID" or item.type not in POINTWISE
+
+
+def moves_with(item, other):
+    return UserError("{name} moves with {other} already", item, other=other.name)
+
+
+POINTWISE = {"MESH", "CURVES", "POINTCLOUD", "GREASEPENCIL", "CURVE", "SURFACE", "LATTICE", "ARMATURE"}
+
+
+# All carried objects of a source during a session or job: read, moved on a worker, shown, restored.
 
 # A carried object during a session or job, and its release.
 
@@ -122,10 +214,10 @@ class Carrying:
         self.source, self.warnings, self.objects, self.before = ObjectReference(source), [], [], {}
         self.rigs, self.under = modifier_stack.handle_rigs(source), above_field(source)
         self.is_shown_posed = False  # whether shapes are shown after the armatures of `under`
-        self.nodes = helper.Follower(source) if helper.of(source) else None
+        self.nodes = field_nodes.Follower(source) if field_nodes.of(source) else None
         for entry in settings_of(source).carried:
             try:
-                refuse(refusals.of_entry(source, entry))
+                refuse(of_entry(source, entry))
                 self.objects.append(CarriedObject(context, entry))
             except (UserError, ValueError) as error:
                 self.warnings.append(error)
@@ -240,7 +332,7 @@ class Carrying:
     def rows_of_nodes(self, field, local_to_solve, strength):
         """The field as rows for the nodes; None, with a warning, if nodes cannot evaluate it."""
         try:
-            return helper.rows_of(field, local_to_solve, strength)
+            return field_nodes.rows_of(field, local_to_solve, strength)
         except UserError as error:
             self.warnings.append(error)
             return None
@@ -259,7 +351,7 @@ class Carrying:
                     before.pop(uid, None)
                 self.before[uid] = before.get(uid) or (carried, carried.carrier.snapshot(item, entry))
                 carried.carrier.bind(context, item, entry)
-                masks.lend(source, item)
+                inputs.lend_mask(source, item)
             except (UserError, RuntimeError) as error:
                 self.leave(carried, error)
         if self.nodes is not None:
@@ -301,7 +393,7 @@ class Carrying:
         """Restores the snapshots of all objects."""
         source = self.source.find()
         for carried, before in self.before.values():
-            if isinstance(carried, helper.Follower):
+            if isinstance(carried, field_nodes.Follower):
                 carried.write(before)
                 continue
             item = carried.reference.find()
@@ -365,7 +457,7 @@ def present(context, source):
     found = []
     for entry in settings_of(source).carried:
         with contextlib.suppress(UserError, ValueError):
-            refuse(refusals.of_entry(source, entry))
+            refuse(of_entry(source, entry))
             carried = CarriedObject(context, entry)
             shape = carried.carrier.present(entry.item, entry)
             found += [] if shape is None else [(carried, shape)]

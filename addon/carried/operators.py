@@ -13,7 +13,7 @@ from ..core.settings.choices import CARRYING
 from ..handles import bones
 from ..live import sessions
 from ..names import Op
-from . import carrying, refusals
+from . import carrying
 
 STUDIO = ("CAMERA", "LIGHT", "LIGHT_PROBE", "SPEAKER")
 
@@ -69,7 +69,7 @@ def candidates(context, source):
 
 def carry(source, item, way):
     """Adds an object to a source's list, or changes its way; UserError if it cannot be carried."""
-    refuse(refusals.of_item(source, item))
+    refuse(carrying.of_item(source, item))
     other = settings_of(item).carried_by
     if other is not None and other != source and carrying.find(other, item) is not None:
         raise UserError("{name} is carried by {other} already", item, other=other.name)
@@ -124,7 +124,7 @@ class ARAPFIELDS_UL_carried(bpy.types.UIList):
         else:
             row.prop(item.item, "name", text="", emboss=False, icon=icon)
         row.prop(item, "way", text="", emboss=False)
-        if refusals.of_entry(data.id_data, item) is not None:
+        if carrying.of_entry(data.id_data, item) is not None:
             row.label(text="", icon="ERROR")
 
 
@@ -149,7 +149,7 @@ class ARAPFIELDS_PT_carried(Section, bpy.types.Panel):
             )
             wrapped(layout, hint, icon="INFO")
         for entry in settings.carried:
-            note(layout, refusals.of_entry(source, entry))
+            note(layout, carrying.of_entry(source, entry))
 
 
 CLASSES = [

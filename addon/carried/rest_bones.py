@@ -11,7 +11,7 @@ from mathutils import Vector
 from ..blender import modifier_stack
 from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..core.errors import UserError, refuse
-from ..core.geometry import posing
+from ..core.geometry import spaces
 from ..core.geometry.spaces import inverse, transform
 from ..handles.movers import matrix_of, numbered
 from ..names import BONE_NUMBER
@@ -66,13 +66,13 @@ class Fitting:
         """Computes the new rest pose of the bones; on a worker."""
         self.moved = []
         for reference, names, poses, lengths, to_solve in self.rigs:
-            points = posing.bone_points(poses, lengths)
+            points = spaces.bone_points(poses, lengths)
             before = transform(to_solve, points)
             after = field(before)
             if not np.isfinite(after).all():
                 raise UserError("The result has bones that are not finite; try other settings")
-            posed = posing.bone_poses(to_solve @ poses, before, after)
-            heads, tails = after[0 :: len(posing.BONE_POINTS)], after[1 :: len(posing.BONE_POINTS)]
+            posed = spaces.bone_poses(to_solve @ poses, before, after)
+            heads, tails = after[0 :: len(spaces.BONE_POINTS)], after[1 :: len(spaces.BONE_POINTS)]
             back = inverse(to_solve)
             axes = posed[:, :3, 2] @ back[:3, :3].T
             self.moved.append((reference, names, transform(back, heads), transform(back, tails), axes))

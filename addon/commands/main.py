@@ -4,12 +4,13 @@
 import contextlib
 import errno
 import importlib
+import platform
 import signal
 import sys
 
 from ..core.errors import UserError, as_user_error
-from ..core.runtime import native
-from .children import Launch, end_with_parent
+from ..core.runtime import native, self_check
+from .batch import Launch, end_with_parent
 
 
 def run(arguments, script=None):
@@ -47,8 +48,21 @@ def run(arguments, script=None):
 
 def verb(name):
     """The function of a verb; only verbs for one file import bpy."""
-    module = name if name in ("batch", "check", "bake", "skin") else "single"
-    return getattr(importlib.import_module(f".{module}", __package__), f"run_{module}")
+    if name == "check":
+        return run_check
+    module = importlib.import_module(".batch" if name == "batch" else ".single", __package__)
+    return getattr(module, f"run_{name if name in ('batch', 'bake', 'skin') else 'single'}")
+
+
+def run_check(*_):
+    """check: a report on the machine, Blender, and small problems with known results; returns the exit code,
+    0 if every result is right, else 1."""
+    import bpy
+
+    lines, works = self_check.run()
+    print(f"Blender {bpy.app.version_string}, {platform.platform()}")
+    print("\n".join([*lines, "everything works" if works else "NOT EVERYTHING WORKS"]), flush=True)
+    return 0 if works else 1
 
 
 @contextlib.contextmanager
@@ -56,7 +70,7 @@ def interruptible():
     """Context manager in which Ctrl-C and SIGTERM raise KeyboardInterrupt; Blender has its own handlers."""
     asked = [signal.SIGINT, signal.SIGTERM]
     if hasattr(signal, "SIGBREAK"):
-        asked.append(signal.SIGBREAK)  # on Windows, from a batch (children.py)
+        asked.append(signal.SIGBREAK)  # on Windows, from a batch (batch.py)
     before = [signal.signal(number, signal.default_int_handler) for number in asked]
     try:
         yield

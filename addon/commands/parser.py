@@ -7,7 +7,7 @@ import re
 from pathlib import Path, PurePath
 
 from arapfields.cli.command_line import parser_with_verbs
-from arapfields.cli.options import shard
+from arapfields.cli.flags import shard
 
 from ..core.settings.choices import (
     BAKE_FORMATS,

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""deform and stylize of one file, with contact from flags and an outcome for each of its objects."""
+"""Verbs for one file: deform and stylize, bake, skin."""
 
+import contextlib
 import json
 import math
 import re
@@ -14,17 +15,22 @@ from mathutils import Matrix
 
 from arapfields.cli.command_line import name_and_margin, shown_progress
 
+from ..animation.object_bake import kind_of
 from ..blender.language import about
 from ..blender.object_references import is_source, settings_of
 from ..contact.properties import add
 from ..core.errors import UserError
 from ..core.runtime import jobs, native
 from ..core.settings.choices import style_identifier
-from ..handles import empties, naming
+from ..core.settings.parameters import SKIN
+from ..handles import empties
 from ..names import REPORT
+from ..skin import writing
 from . import files, parser
 from .files import READ
 from .parser import solve_settings
+
+# deform and stylize of one file, with contact from flags and an outcome for each of its objects.
 
 # Obstacles and other contact settings from flags, in addition to the objects' own settings.
 
@@ -165,7 +171,7 @@ def add_handles(source, path):
             target[:3, :3] = rest[:3, :3]
             rest[:3, 3], target[:3, 3] = handle.rest, handle.target
         kind = "POINT" if point else "CUBE"
-        handle_name = naming.name_for(source, rest[:3, 3], kind)
+        handle_name = empties.name_for(source, rest[:3, 3], kind)
         empty = empties.make_empty(bpy.context, source, Matrix(rest.tolist()), 1.0, handle_name)
         if not np.allclose(empty.matrix_world, rest, rtol=1e-4, atol=1e-6 * np.abs(rest).max()):
             raise UserError(f"{name}: its box is sheared; an Empty cannot be")
@@ -234,3 +240,142 @@ def write_json(path, content):
 def progress(quiet):
     """Context manager that reports progress: a bar on a terminal, else a line now and then."""
     return shown_progress(jobs.progress, quiet=quiet, apart=15.0)
+
+
+# bake: the animation of a .blend, to point caches or an exported file; whole, or one part of the frames.
+
+EXPORTS = {".abc": "ABC", ".usdc": "USD", ".glb": "GLTF"}
+
+
+def run_bake(options, _):
+    """Returns exit code 0 if all frames, or this part of them, are done for every object; else 1."""
+    suffix = required_suffix(options)
+    target = options.output.resolve() if options.output else None
+    folder = options.folder.resolve() if options.folder else None
+    files.read(options.input)
+    for place in (target, folder / "cache" if folder and folder.parent.is_dir() else None):
+        if place:
+            files.check_place(place)
+    sources = objects_to_solve(options) if options.objects else animated(options)
+    tell_of_others(options, moves)
+    with progress(options.quiet), chosen(sources):
+        if suffix in EXPORTS:
+            reason = failure(
+                bpy.ops.arapfields.export_animation,
+                **frames(options),
+                filepath=str(target),
+                format=EXPORTS[suffix],
+            )
+        else:
+            caches = {"format": options.format.upper(), "part": options.shard or (1, 1)}
+            caches |= {"folder": str(folder)} if folder else {}
+            reason = failure(bpy.ops.arapfields.bake, **frames(options), **caches)
+    if reason and not jobs.messages():
+        raise UserError(reason)
+    for level, text in jobs.messages():
+        print(f"arapfields: {text}", file=sys.stdout if level == "INFO" else sys.stderr, flush=True)
+    if not reason and suffix == ".blend":
+        files.write(target, [])
+    failed = any(level != "INFO" for level, _ in jobs.messages())
+    return 1 if reason or failed else 0
+
+
+def required_suffix(options):
+    """The output's suffix, "" without an output; UserError if it is unknown or the input is not a .blend."""
+    if options.input.suffix.lower() != ".blend":
+        raise UserError(f"{options.input}: is no .blend; a scene is baked as it is")
+    suffix = options.output.suffix.lower() if options.output else ""
+    if suffix not in ("", ".blend", *EXPORTS):
+        known = ", ".join((".blend", *EXPORTS))
+        raise UserError(f"{options.output}: unknown extension; known are {known}")
+    if suffix in EXPORTS and options.shard:
+        raise UserError("--shard: an exported file has no parts; bake the parts first, then export")
+    return suffix
+
+
+def frames(options):
+    """Scope, kind and frame range as arguments of the bake operators."""
+    given = {"scope": "SELECTED"}
+    if options.kind:
+        given["kind"] = options.kind.upper()
+    if options.frames:
+        given["start"], given["end"] = options.frames
+    return given | {name: value for name in ("step", "subframes") if (value := getattr(options, name))}
+
+
+def animated(options):
+    """The objects with handles or with an animated style."""
+    meshes = [item for item in bpy.context.view_layer.objects if is_source(item)]
+    meshes = [item for item in meshes if moves(item)]
+    if not meshes:
+        raise UserError(f"{options.input}: no object has handles, or a style with keyframes")
+    return meshes
+
+
+def moves(item):
+    """Whether an object has handles, or an animated style."""
+    return bool(empties.used(item)) or kind_of(item, "AUTO") == "STYLIZE"
+
+
+@contextlib.contextmanager
+def chosen(sources):
+    """Context manager: selects these objects for operators; shows those that are hidden or disabled."""
+    home, disabled, brought = bpy.context.scene.collection, [], []
+    for item in bpy.context.selected_objects:
+        item.select_set(False)
+    for item in sources:
+        item.hide_set(False)
+        if item.hide_viewport:
+            disabled.append(item)
+            item.hide_viewport = False
+        if not item.visible_get():
+            brought.append(item)
+            home.objects.link(item)
+        item.select_set(True)
+    bpy.context.view_layer.objects.active = sources[0]
+    try:
+        yield
+    finally:
+        for item in disabled:
+            item.hide_viewport = True
+        for item in brought:
+            home.objects.unlink(item)
+
+
+# skin: skins the meshes of a .blend to its armature.
+
+
+def run_skin(options, _):
+    """Returns exit code 0 if the meshes are skinned, 1 if that failed."""
+    for path in (options.input, options.output):
+        if path.suffix.lower() != ".blend":
+            raise UserError(f"{path}: is no .blend, which has meshes with an armature")
+    files.read(options.input)
+    files.check_place(options.output)
+    armature = rig_named(options)
+    meshes = objects_to_solve(options)
+    if not options.objects:
+        meshes = [item for item in meshes if writing.refusal_of(armature, item) is None]
+    given = {p.name: getattr(options, p.name) for p in SKIN if getattr(options, p.name) is not None}
+    given |= {"groups": options.groups.upper()} if options.groups else {}
+    with progress(options.quiet), chosen([armature, *meshes]):
+        reason = failure(bpy.ops.arapfields.skin, **given)
+    for level, text in jobs.messages():
+        print(f"arapfields: {text}", file=sys.stdout if level == "INFO" else sys.stderr, flush=True)
+    if reason and not jobs.messages():
+        raise UserError(reason)
+    if not reason:
+        files.write(options.output, [])
+    return 1 if reason else 0
+
+
+def rig_named(options):
+    """The armature of that name; without a name the only one."""
+    found = [item for item in bpy.context.view_layer.objects if item.type == "ARMATURE"]
+    names = [item.name for item in found]
+    wanted = [item for item in found if options.armature in (None, item.name)]
+    if not found:
+        raise UserError(f"{options.input}: holds no armature")
+    if len(wanted) != 1:
+        raise UserError(f"{options.input}: --armature names one of: {', '.join(sorted(names))}")
+    return wanted[0]

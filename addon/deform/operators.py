@@ -4,12 +4,12 @@ import bpy
 from ..blender.evaluation import world_matrix
 from ..blender.language import about
 from ..blender.object_references import settings_of
-from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_values, options_of
+from ..blender.user_preferences import preset_classes
 from ..core.errors import UserError
 from ..core.runtime import native
 from ..core.settings.parameters import DEFORM, is_fast
-from ..handles import empties, scaling, symmetry
+from ..handles import empties, symmetry
 from ..handles.native_handles import native_handles
 from ..properties.choices import result_properties
 from ..solver.contact import for_job, native_contact, notes_on
@@ -51,7 +51,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         contact = for_job(context, source, fast, space)
         if not fast:
             require_no_reach(handles)
-        scaled = scaling.ignored(source)
+        scaled = empties.ignored_scale(source)
         if scaled is not None:
             self.warnings.append(about(source.name, scaled))
 

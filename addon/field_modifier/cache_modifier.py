@@ -10,7 +10,7 @@ from ..blender import modifier_stack
 from ..blender.actions import pace
 from ..blender.object_references import settings_of
 from ..names import CACHE_MODIFIER
-from . import inputs, masks
+from . import inputs
 
 
 def play(source, path, start, step):
@@ -38,7 +38,7 @@ def add(source):
     if field is not None:
         index += 1
         modifier.factor = inputs.get(field, "Factor")
-    group = masks.group_of(source)
+    group = inputs.mask_of(source)
     modifier.vertex_group = group if group in source.vertex_groups else ""
     source.modifiers.move(source.modifiers.find(modifier.name), index)
     return source.modifiers[index]

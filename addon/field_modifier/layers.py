@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers: earlier results that later ones act on, a style on a wrap, a deformation on both.
-
-A layer is a former field modifier. It keeps its place, its Factor and its motion, in attributes of its own.
-When the field's modifier is removed, the last layer becomes the field's modifier again.
-"""
+"""Layers of fields on one object: their order, and modifiers that are off, doubled or left behind."""
 
 import contextlib
 from itertools import count
@@ -11,12 +7,66 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack, undo_steps
+from ..blender import mesh_arrays, modifier_stack, references
+from ..blender.actions import varies
+from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError
+from ..core.runtime import jobs
 from ..names import FIELD_MODIFIER, LAYER_GROUP
 from . import cache_modifier, inputs, motion, node_group
+
+# Checks whether the user has disabled the field's modifier, or something does not follow it.
+
+
+def reasons_unseen(source):
+    """[UserError] if the field's modifier is off or its Factor 0, and neither is animated; and if modifiers
+    before it, such as hair, use the surface that is not moved yet."""
+    modifier = modifier_stack.find(source)
+    return [] if modifier is None else modifier_off(source, modifier) + unmoved_modifiers(source)
+
+
+def unmoved_modifiers(source):
+    left = modifier_stack.left_behind(source)
+    if not left:
+        return []
+    names = ", ".join(one.name for one in left)
+    return [
+        UserError(
+            "{name}: {modifiers} stays where the surface was; move it behind the field's modifier",
+            source,
+            modifiers=names,
+        )
+    ]
+
+
+def modifier_off(source, modifier):
+    if modifier.show_viewport and inputs.get(modifier, "Factor") != 0.0:
+        return []
+    if varies(source, f'modifiers["{modifier.name}"]'):
+        return []
+    return [
+        UserError("The modifier {modifier} of {name} is off, or its Factor 0", source, modifier=modifier.name)
+    ]
+
+
+# Disables duplicates of the field's modifier in one stack, which would double the motion.
+
+
+def switch_copies_off(source):
+    """Disables all but the first field modifier of an object."""
+    for modifier in [m for m in source.modifiers if modifier_stack.is_field(m)][1:]:
+        if modifier.show_viewport or modifier.show_render:
+            modifier.show_viewport = modifier.show_render = False
+            text = translated("{name} is a second copy and was switched off", name=modifier.name)
+            jobs.add_message("WARNING", f"{source.name}: {text}")
+
+
+# Layers: earlier results that later ones act on, a style on a wrap, a deformation on both.
+#
+# A layer is a former field modifier. It keeps its place, its Factor and its motion, in attributes of its
+# own. When the field's modifier is removed, the last layer becomes the field's modifier again.
 
 ORDER = {"WRAP": 0, "STYLIZE": 1, "DEFORM": 2}  # each acts on the results of lower ones
 STAYING = {"WRAP": "Wrap", "STYLIZE": "Stylize"}  # {kind that can become a layer: its label}
@@ -84,7 +134,7 @@ def make_way(source, kind):
             break
         field, by = modifier_stack.find(source), settings_of(source).moved_by
         gone.append(field and (motion.snapshot(source), by, inputs.get(field, "Factor")))
-        with undo_steps.unused_kept():  # put_back() may take them again, without a step of undo
+        with references.unused_kept():  # put_back() may take them again, without a step of undo
             motion.discard(source)
             uncover(source, baked=True)
     return Way(gone=tuple(gone))

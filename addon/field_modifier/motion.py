@@ -1,23 +1,67 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An object's motion: its modifier, and the mesh that stores the offsets.
+"""Disables Armature modifiers whose bones are handles, while the field poses instead."""
 
-Offsets are attributes of the mesh itself, or of a helper mesh in no scene if earlier modifiers make the
-vertices, or if the mesh is linked or shared with other objects. While an object is live it has a helper in
-any case, empty if it is not needed: it may be needed between two steps of undo (blender/undo_steps.py).
-"""
-
+import json
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack, splat_layouts, undo_steps
+from ..blender import mesh_arrays, modifier_stack, references, splat_layouts
 from ..blender.object_references import settings_of
 from ..blender.point_data import points_of
 from ..blender.references import remove_mesh_object, remove_node_modifier, remove_unused_group
 from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, SHAPE_OF
-from . import armatures, cache_modifier, inputs, masks, node_group
+from . import cache_modifier, inputs, node_group
+
+
+def silence_armatures(source):
+    """Disables them and stores their visibility; restores those that the field no longer replaces."""
+    rigs = modifier_stack.handle_rigs(source)
+    noted = read_silenced(source)
+    for modifier in source.modifiers:
+        if modifier_stack.is_replaced(modifier, rigs):
+            if key_of_silenced(noted, modifier) is None:
+                noted[str(modifier.persistent_uid)] = [modifier.show_viewport, modifier.show_render]
+            modifier.show_viewport = modifier.show_render = False
+        elif key_of_silenced(noted, modifier) is not None:
+            modifier.show_viewport, modifier.show_render = noted.pop(key_of_silenced(noted, modifier))
+    write_silenced(source, noted)
+
+
+def restore_armatures(source):
+    """Restores the visibility of all of them."""
+    noted = read_silenced(source)
+    for modifier in source.modifiers:
+        if key_of_silenced(noted, modifier) is not None:
+            modifier.show_viewport, modifier.show_render = noted[key_of_silenced(noted, modifier)]
+    write_silenced(source, {})
+
+
+def key_of_silenced(noted, modifier):
+    """Key of a stored modifier: its persistent_uid, or in files of earlier versions its name; or None."""
+    keys = str(modifier.persistent_uid), modifier.name
+    return next((key for key in keys if key in noted), None)
+
+
+def read_silenced(source):
+    text = settings_of(source).silenced
+    return json.loads(text) if text else {}
+
+
+def write_silenced(source, noted):
+    text = json.dumps(noted) if noted else ""
+    if settings_of(source).silenced != text:  # any write tags the object as updated
+        settings_of(source).silenced = text
+
+
+# An object's motion: its modifier, and the mesh that stores the offsets.
+#
+# Offsets are attributes of the mesh itself, or of a helper mesh in no scene if earlier modifiers make the
+# vertices, or if the mesh is linked or shared with other objects. While an object is live it has a helper
+# in any case, empty if it is not needed: it may be needed between two steps of undo
+# (blender/references.py).
 
 written = set()  # session_uids of objects that the add-on itself has moved since the last depsgraph update
 
@@ -50,7 +94,7 @@ def bind(context, source, expected=None, live=False):
         splats = splat_layouts.columns_of(mesh)
     if expected not in (None, count):
         raise UserError("{name} changed while it was worked on; run again", source)
-    armatures.silence(source)
+    silence_armatures(source)
     cache_modifier.suspend(source)
     on_mesh = lies_on_mesh(source)
     if splats and not on_mesh:
@@ -59,7 +103,7 @@ def bind(context, source, expected=None, live=False):
         modifier = add(source, normals, splats)
     else:
         choose_group(modifier, normals, splats)
-    masks.take(source)
+    inputs.take_mask(source)
     earlier, moved = carrier(source, modifier), snapshot(source)
     if live or not on_mesh:
         take_helper(source, modifier)
@@ -82,7 +126,7 @@ def lies_on_mesh(source):
 
 def add(source, normals, splats):
     """A new field modifier at its place."""
-    undo_steps.refuse_new(source)
+    references.refuse_new(source)
     index = modifier_stack.place(source)
     modifier = source.modifiers.new(FIELD_MODIFIER, "NODES")
     modifier.node_group = node_group.find_or_make(normals, splats)
@@ -93,7 +137,7 @@ def add(source, normals, splats):
 def choose_group(modifier, normals, splats):
     """Replaces the node group if the domain of the normals has changed."""
     if not node_group.is_for(modifier, normals, splats):
-        undo_steps.refuse_new(modifier.id_data)
+        references.refuse_new(modifier.id_data)
         take_group(modifier, node_group.find_or_make(normals, splats))
 
 
@@ -114,11 +158,11 @@ def take_helper(source, modifier):
     """Gives the modifier a helper of its own, unless it has one; between two steps of undo also one that it
     shares with a duplicate will do. Returns it."""
     helper = inputs.get(modifier, "Offsets")
-    if helper is not None and helper.library is None and (users_of(helper) == 1 or undo_steps.is_between):
+    if helper is not None and helper.library is None and (users_of(helper) == 1 or references.is_between):
         return helper
     own = unused_helper(source)
     if own is None:
-        undo_steps.refuse_new(source)
+        references.refuse_new(source)
         mesh = bpy.data.meshes.new(f"{source.name}{HELPER_SUFFIX}")
         own = bpy.data.objects.new(mesh.name, mesh)
     if helper is not None:
@@ -148,7 +192,7 @@ def leave_helper(modifier, live=False):
     if users_of(helper) > 1 or helper.library is not None:
         if len(helper.data.vertices):
             inputs.put(modifier, "Offsets", None)
-    elif live or undo_steps.keeps_unused:
+    elif live or references.keeps_unused:
         empty(helper)
     else:
         inputs.put(modifier, "Offsets", None)
@@ -188,7 +232,7 @@ def users_of(helper):
 
 
 def discard_helper(helper):
-    if users_of(helper) == 0 and helper.library is None and not undo_steps.keeps_unused:
+    if users_of(helper) == 0 and helper.library is None and not references.keeps_unused:
         remove_mesh_object(helper)
 
 
@@ -268,7 +312,7 @@ def restore(source, motion):
 def remove(source):
     """Removes the modifier with its helper data, and enables the object's Armature modifiers."""
     discard(source)
-    armatures.restore(source)
+    restore_armatures(source)
 
 
 def discard(source):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Empties as handles: rest boxes are stored in the source's coordinates, targets read from the Empties."""
+"""Empties of handles: made, named, found, chosen in the list, scaled, and deleted."""
+
+import re
 
 import bpy
 import numpy as np
@@ -7,18 +9,120 @@ from mathutils import Matrix, Vector
 
 from ..blender import former_defaults, mesh_arrays, modifier_stack, vertex_groups
 from ..blender.evaluation import is_driven
-from ..blender.object_references import in_scene, settings_of
+from ..blender.language import translated
+from ..blender.object_references import choose_row, in_scene, owner_of, settings_of
 from ..blender.point_data import selection_of
 from ..blender.property_definitions import from_single_precision
-from ..blender.selection import choose_row
 from ..core.errors import UserError, refuse
 from ..core.geometry.handles import far_handle, solve_handle
 from ..core.geometry.spaces import Space, inverse, space_of, transform
 from ..core.runtime.jobs import run_to_completion
 from ..names import HANDLES, HANDLES_MARK
-from . import movers, naming, symmetry
+from . import movers, symmetry
 from .movers import box_now, current_box, has_mover, matrix_of, name_of
-from .naming import free_colour
+
+# Empties of handles: made, named, found, chosen in the list, and deleted.
+
+# Names and colours of handles.
+
+# Names of handles, by the vertex group that they hold, such as "head", else "Handle 3".
+
+RIG_PREFIX = re.compile(r"^(DEF|ORG|MCH)-")  # prefixes of bones in generated rigs
+BLENDERS_OWN = re.compile(r"(\.\d{3,})?$")  # suffix that Blender appends to a used name
+
+
+def name_for(obj, point_world, kind) -> str:
+    """A name for a handle of `obj` at a point: its strongest vertex group there, else its kind and a number.
+
+    `obj` is the mesh object, `point_world` (3,) in world space, `kind` CUBE, POINT, GROUP or PIN.
+    """
+    group = group_at(obj, point_world) if obj.vertex_groups else ""
+    return name_of_group(group) or numbered(obj, kind)
+
+
+def name_of_group(group):
+    """A vertex group's name without a rig's prefix."""
+    return RIG_PREFIX.sub("", group)
+
+
+def group_at(obj, point_world):
+    """The vertex group with the largest weight at the vertex nearest to a world location; "" for none."""
+    try:
+        with modifier_stack.evaluated_mesh(bpy.context, obj, settings_of(obj).in_place) as mesh:
+            index = nearest(mesh, obj, point_world)
+            weights = [] if index is None else [(e.weight, e.group) for e in mesh.vertices[index].groups]
+    except UserError:  # no mesh to read
+        return ""
+    weights = [entry for entry in weights if entry[0] > 0]
+    return obj.vertex_groups[max(weights)[1]].name if weights else ""
+
+
+def nearest(mesh, obj, point_world):
+    """Index of the vertex nearest to a world location; None without vertices."""
+    points = mesh_arrays.positions(mesh)
+    if not len(points):
+        return None
+    matrix = np.array(obj.matrix_world, dtype=np.float64)
+    return int(np.linalg.norm(points @ matrix[:3, :3].T + matrix[:3, 3] - point_world, axis=1).argmin())
+
+
+def numbered(obj, kind):
+    """ "Handle 3" for the third handle of the object, or the next number that no object has."""
+    word = translated("Pin") if kind == "PIN" else translated("Handle")
+    number = len(settings_of(obj).handles) + 1
+    while f"{word} {number}" in bpy.data.objects:
+        number += 1
+    return f"{word} {number}"
+
+
+def is_blenders_own(empty):
+    """Whether Blender named an Empty, rather than the user."""
+    plain = BLENDERS_OWN.sub("", empty.name)
+    return plain in ("Empty", bpy.app.translations.pgettext_data("Empty"))
+
+
+# Colours of handles: distinct from each other, from a grey viewport and from Blender's selection orange.
+
+PALETTE = [
+    *((0.27, 0.55, 1.0), (1.0, 0.42, 0.30), (0.35, 0.80, 0.40), (0.85, 0.45, 0.90), (1.0, 0.80, 0.25)),
+    *((0.62, 0.92, 1.0), (0.55, 0.10, 1.0), (0.77, 0.18, 0.48), (0.62, 1.0, 0.10), (1.0, 0.70, 0.92)),
+    *((0.48, 0.48, 0.25), (0.10, 0.77, 0.85), (0.10, 0.62, 0.10), (0.70, 0.62, 0.18), (0.48, 0.40, 0.62)),
+    *((0.10, 1.0, 0.77), (1.0, 0.10, 0.70), (0.10, 0.55, 0.62)),
+]
+
+
+def free_colour(handles):
+    """The colour that the fewest of these handles have."""
+    counts = [sum(is_colour(entry.colour, colour) for entry in handles) for colour in PALETTE]
+    return PALETTE[counts.index(min(counts))]
+
+
+def is_colour(one, other):
+    return max(abs(a - b) for a, b in zip(one, other, strict=True)) < 1e-3
+
+
+# Makes a handle's row active when its Empty becomes active; blender/object_references.py does the reverse.
+
+seen_active = {}  # "active": session_uid of the active object at the last check
+
+
+def follow_active(context):
+    """Checks the active object; called after depsgraph updates."""
+    layer = getattr(context, "view_layer", None)
+    active = layer.objects.active if layer is not None else None
+    uid = active.session_uid if active is not None else None
+    if seen_active.get("active") == uid:
+        return
+    seen_active["active"] = uid
+    source = owner_of(active) if active is not None and active.type == "EMPTY" else None
+    if source is None or source.library is not None:
+        return
+    index = find(source, active)
+    if index >= 0 and index != settings_of(source).active_handle:
+        choose_row(settings_of(source), index)
+
+
+# Empties as handles: rest boxes are stored in the source's coordinates, targets read from the Empties.
 
 
 def rest_box(source, entry, where=matrix_of):
@@ -212,7 +316,7 @@ def new_empty(context, source, kind, group, place):
     size = float(np.ptp(corners, axis=0).max()) / 6 or 1.0
     if place == "SELECTION":
         matrix = Matrix(selection_box(source, size).tolist())
-        name = naming.name_for(source, matrix.translation, kind)
+        name = name_for(source, matrix.translation, kind)
         return make_empty(context, source, matrix, 1.0, name)
     where = context.scene.cursor.location
     if kind == "GROUP":
@@ -221,7 +325,7 @@ def new_empty(context, source, kind, group, place):
         with modifier_stack.evaluated_mesh(context, source, in_place) as mesh:
             middle = np.average(mesh_arrays.positions(mesh), axis=0, weights=weights)
         where = source.matrix_world @ Vector(middle)
-    name = naming.name_of_group(group) if kind == "GROUP" else naming.name_for(source, where, kind)
+    name = name_of_group(group) if kind == "GROUP" else name_for(source, where, kind)
     return make_empty(context, source, Matrix.Translation(where), size, name)
 
 
@@ -280,3 +384,26 @@ def remove(source, index):
         settings_of(empty).handle_of = None
     settings.handles.remove(index)
     choose_row(settings, max(0, min(settings.active_handle, len(settings.handles) - 1)))
+
+
+# Handles that are scaled without Allow Scale.
+
+LEAST_SCALE = 1e-3  # relative difference from the rest size above which a box counts as scaled
+
+
+def ignored_scale(source):
+    """UserError that names the handles whose scale is ignored; else None."""
+    names = [movers.name_of(entry) for entry in used(source) if is_scale_ignored(source, entry)]
+    if not names:
+        return None
+    return UserError("{names} is scaled, which counts only with Allow Scale", names=", ".join(names))
+
+
+def is_scale_ignored(source, entry):
+    if entry.allow_scale or entry.kind == "POINT":
+        return False
+    rest, now = rest_box(source, entry)[:3, :3], movers.box_now(entry)[:3, :3]
+    if not np.isfinite(now).all() or abs(np.linalg.det(rest)) == 0.0:
+        return False  # refused elsewhere
+    stretches = np.linalg.svd(now @ np.linalg.inv(rest), compute_uv=False)
+    return bool(np.abs(stretches - 1.0).max() > LEAST_SCALE)

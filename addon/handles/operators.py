@@ -3,16 +3,15 @@ import bpy
 
 from ..blender import vertex_groups
 from ..blender.language import translated
-from ..blender.object_references import settings_of, source_of
+from ..blender.object_references import select_alone, settings_of, source_of
 from ..blender.property_definitions import choice, flag, text
-from ..blender.selection import select_alone
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..core.geometry.handles import nothing_held
 from ..core.runtime import native
 from ..core.settings.choices import BONES, EMPTY_KINDS, HANDLE_PLACES
 from ..field_modifier import layers
-from . import bones, empties, held_counts, movers, naming
+from . import bones, empties, held_counts, movers
 
 
 class HandleOperator(SourceOperator):
@@ -82,8 +81,8 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
                 selected = [empties.new_empty(context, source, self.kind, group, self.place)]
         others = {settings_of(empty).handle_of for empty in selected} - {None, source}
         for empty in selected:
-            if naming.is_blenders_own(empty):
-                empty.name = naming.name_for(source, empty.matrix_world.translation, self.kind)
+            if empties.is_blenders_own(empty):
+                empty.name = empties.name_for(source, empty.matrix_world.translation, self.kind)
             entry = empties.add(source, empty, self.kind)
             entry.group = group if self.kind == "GROUP" else ""
         if is_new:

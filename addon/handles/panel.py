@@ -6,7 +6,7 @@ from ..blender.language import translated
 from ..blender.object_references import in_scene, source_of
 from ..blender.section import Section, draw_settings, group_row, note, switched, wrapped
 from ..names import Op
-from . import empties, movers, scaling
+from . import empties, movers
 
 ICONS = {"CUBE": "CUBE", "POINT": "DOT", "GROUP": "GROUP_VERTEX", "PIN": "PINNED", "BONE": "BONE_DATA"}
 
@@ -117,7 +117,7 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
                 group_row(layout, entry, "group", source)
             if entry.group:
                 draw_settings(layout, entry, "hold_from")
-            note(layout, scaling.ignored(source))
+            note(layout, empties.ignored_scale(source))
 
 
 CLASSES = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Display of the running job in the window, and the timer that drives it; removed with the job."""
+"""A job's preview in the viewport, and its progress in the status bar."""
 
 import time
 
@@ -7,7 +7,12 @@ import bpy
 
 from ..blender import host, user_preferences
 from ..blender.host import redraw
+from ..blender.language import translated
+from ..core.runtime import jobs
 from ..core.runtime.jobs import RedrawThrottle
+from ..names import Op
+
+# Display of the running job in the window, and the timer that drives it; removed with the job.
 
 TICK = 0.03  # seconds between timer events
 
@@ -76,3 +81,20 @@ def show_status(text):
 
 
 display = Display()
+
+
+# The running job's progress, in the window's status bar, which is visible without the sidebar.
+
+
+def draw(header, context):
+    """Draws what the job is at, its progress with the time left, and a button that cancels it."""
+    job = jobs.running()
+    if job is None:
+        return
+    row, left = header.layout.row(align=True), job.remaining
+    row.label(text=job.message, translate=False)
+    text = f"{translated(job.title)} {job.fraction:.0%}"
+    if left is not None:
+        text += translated(", about {seconds} s left", seconds=f"{left:.0f}")
+    row.progress(factor=job.fraction, text=text)
+    row.operator(Op.CANCEL, icon="X")

@@ -1,18 +1,110 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What shows a live shape: the source's field modifier, or an object of its own."""
+"""What shows a live shape: the source's modifier, or an object of its own."""
 
 from typing import Any, NamedTuple
 
+import bpy
 import numpy as np
 
-from ..blender import modifier_stack
-from ..blender.object_references import settings_of
+from ..blender import mesh_arrays, modifier_stack, references
+from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..core.errors import UserError
-from ..field_modifier import armatures, cache_modifier, motion
+from ..field_modifier import cache_modifier, motion
 from ..field_modifier.layers import Way
-from ..results import placement, visibility
+from ..results import placement, result_objects
 from . import stored
-from .live_object import LIVE, LiveObject
+
+# A live shape that is an object of its own: a surface, or the copy that the user wants as the result.
+
+LIVE = "LIVE"  # kind of a live result in the source's list of results
+
+
+class LiveObject:
+    """Made when live mode starts; hides the source in viewports and renders."""
+
+    in_place, arrays = False, ()
+
+    def __init__(self, context, source, surface):
+        references.refuse_new(source)
+        mesh = result_objects.shown_mesh(context, source, len(surface.local))
+        active, selected = context.view_layer.objects.active, list(context.selected_objects)
+        item = result_objects.show(context, source, LIVE, LIVE, mesh, {"output": LIVE}, select=False)
+        placement.show_alone(source, item, for_now=True)
+        context.view_layer.objects.active = active
+        for other in selected:
+            other.select_set(True)
+        self.result = ObjectReference(item)
+
+    def bind(self, context, source):
+        """Gives the object the source's present vertices and faces, unless it shows an implicit surface."""
+        item = self.result.get()
+        if settings_of(source).output == "WARP" and item.mode != "EDIT":
+            shown = modifier_stack.mesh_copy(context, source)
+            try:
+                if not mesh_arrays.same_topology(item.data, shown):
+                    mesh_arrays.take_all(item.data, shown)
+            finally:
+                bpy.data.meshes.remove(shown)
+
+    def is_there(self):
+        """Whether the object is in the step that was undone to."""
+        return in_scene(self.result.find())
+
+    def require(self, source):
+        """Raises UserError if the user has deleted the object."""
+        self.result.get()
+
+    def show(self, source, shape):
+        """Writes a Shape to the object's mesh; False in Edit Mode, or if its topology is unknown."""
+        item = self.result.get()
+        if item.mode == "EDIT":
+            return False
+        if len(item.data.vertices) != len(shape.points):
+            if shape.topology is None:
+                return False
+            mesh_arrays.fill(item.data, shape.points, shape.topology)
+        mesh_arrays.set_positions(item.data, shape.points)
+        return True
+
+    def take_away(self, source):
+        """Removes the object, even if undo has unlinked it from all scenes, and shows the source again."""
+        if source is not None:
+            forget(source)
+        leftover = self.result.find()
+        if leftover is not None:
+            result_objects.discard(leftover)
+
+    def keep(self, context, source, kind):
+        """Replaces the live object by a result of that kind with the same mesh; returns the result."""
+        item = self.result.find()
+        if item is None:
+            raise UserError("{name} has no live result", source)
+        forget(source)
+        mesh = item.data
+        bpy.data.objects.remove(item)
+        item = result_objects.show(context, source, kind, settings_of(source).output, mesh, {"output": LIVE})
+        placement.show_alone(source, item)
+        return item
+
+
+def forget(source):
+    """Ends the source's live state, restores its visibility; returns its live result's object, or None."""
+    settings_of(source).live_kind = ""
+    placement.give_back(source)
+    return forget_result(source)
+
+
+def forget_result(source):
+    """Removes the live result from the source's list of results; returns its object, or None."""
+    settings, item = settings_of(source), None
+    for index in reversed(range(len(settings.results))):
+        if settings.results[index].kind == LIVE:
+            item = settings.results[index].item
+            settings.results.remove(index)
+    return item
+
+
+# What shows a live shape: the source's field modifier, or an object of its own.
 
 # A live shape on the source itself: its field modifier moves, nothing is added or hidden.
 
@@ -29,7 +121,7 @@ class LiveModifier:
         self.was_silent = bool(settings_of(source).silenced)
         self.was_playing = cache_modifier.is_playing(source)
         self.bind(context, source)
-        visibility.show_alone(source, source, for_now=True)
+        placement.show_alone(source, source, for_now=True)
 
     def bind(self, context, source):
         """Binds the modifier, also after an edit of the source; `before` stays as it is."""
@@ -64,13 +156,13 @@ class LiveModifier:
         if source is not None:
             settings_of(source).live_kind = ""
             stored.put_mark(source, "")
-            visibility.give_back(source)
+            placement.give_back(source)
             if source.mode != "EDIT":
                 motion.restore(source, self.before)
                 motion.drop_empty_helper(source)
                 settings_of(source).moved_by = self.moved_by
                 if not self.was_silent:
-                    armatures.restore(source)
+                    motion.restore_armatures(source)
                 if self.was_playing:
                     cache_modifier.set_playing(source, True)
 
@@ -81,7 +173,7 @@ class LiveModifier:
         settings.live_kind = ""
         stored.put_mark(source, "")
         motion.drop_empty_helper(source)
-        visibility.forget(source)
+        placement.keep_visibility(source)
         result, shape = settings.result, self.shown
         is_placed = result in ("REPLACE", "KEY") and shape is not None
         if is_placed and not placement.refusal(source, "WARP", result):

@@ -13,8 +13,7 @@ from ..field_modifier import layers
 from ..handles import empties
 from ..handles.movers import frozen
 from ..jobs.job_operator import unready
-from ..results.placement import placement_refusal
-from ..results.removal import take_off
+from ..results.placement import placement_refusal, take_off
 from ..solver import style_settings
 from . import sessions
 

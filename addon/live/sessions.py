@@ -9,7 +9,7 @@ import contextlib
 
 import bpy
 
-from ..blender import host, modifier_stack, property_definitions, undo_steps
+from ..blender import host, modifier_stack, property_definitions, references
 from ..blender.evaluation import depsgraph_of, updated
 from ..blender.host import redraw
 from ..blender.language import about
@@ -20,9 +20,8 @@ from ..field_modifier import layers
 from ..results import placement
 from ..solver.frame_range import involved
 from ..solver.source_reader import SourceChanged, uses_handles
-from .edits import Updates
 from .playback import scene_frame
-from .session import Session
+from .session import Session, Updates
 from .stored import Kept
 
 
@@ -225,7 +224,7 @@ def update(context, wait=0.0, refined=False):
     return_all(context)
     live.shown_scene.follow(context, live.values())
     if any([update_one(context, uid, wait, refined) for uid in list(live)]):
-        undo_steps.push("Live")
+        references.push("Live")
 
 
 def update_one(context, uid, wait=0.0, refined=False):
@@ -238,7 +237,7 @@ def update_one(context, uid, wait=0.0, refined=False):
         session.show()
         warn(session)
     except SourceChanged:
-        with undo_steps.between():
+        with references.between():
             return not restart(context, uid, session)
     except (UserError, ValueError, ReferenceError) as error:
         return end_with_error(uid, session, error)
@@ -277,7 +276,7 @@ def end_with_error(uid, session, error):
 
 def take_away(session):
     """Removes the live shape, even if undo has unlinked the source or the shape from all scenes."""
-    with contextlib.suppress(UserError, ReferenceError, AttributeError), undo_steps.unused_kept():
+    with contextlib.suppress(UserError, ReferenceError, AttributeError), references.unused_kept():
         session.take_away(session.source.find())
 
 
@@ -324,7 +323,7 @@ def return_all(context):
     for source in [one for one in live.returning and bpy.data.objects if one.session_uid in live.returning]:
         former, kind = live.returning[source.session_uid], settings_of(source).live_kind
         try:
-            with undo_steps.between():
+            with references.between():
                 begin(context, source, kind, former.keeps_shape)
         except UserError as error:
             jobs.add_message("ERROR", about(source.name, error))

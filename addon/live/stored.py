@@ -10,8 +10,7 @@ import hashlib
 from ..blender import modifier_stack
 from ..blender.object_references import settings_of
 from ..blender.point_data import points_of
-from ..field_modifier import motion
-from ..field_nodes import helper
+from ..field_modifier import field_nodes, motion
 from ..names import SHAPE_OF
 
 UNSETTLED = "?"  # the mark of a shape whose solve has not ended
@@ -53,7 +52,7 @@ def mark(source):
 
 
 def put_mark(source, key):
-    modifier, nodes = modifier_stack.find(source), helper.of(source)
+    modifier, nodes = modifier_stack.find(source), field_nodes.of(source)
     meshes = [motion.carrier(source, modifier)] if modifier is not None else []
     for mesh in [*meshes, *([nodes.data] if nodes is not None else [])]:
         if mesh.get(SHAPE_OF, "") == key:
@@ -91,7 +90,7 @@ def wanted(source, pose):
 
 def recall(source, pose):
     """Shows a pose's shape again, bit for bit, from the mesh or the cache; False if neither has it."""
-    key, nodes = wanted(source, pose), helper.of(source)
+    key, nodes = wanted(source, pose), field_nodes.of(source)
     if nodes is not None and nodes.data.get(SHAPE_OF) != key:
         return False
     if mark(source) != key:

@@ -10,7 +10,7 @@ from ..blender import mesh_arrays
 from ..blender.object_references import ObjectReference, settings_of, source_of
 from ..blender.splat_layouts import holds_splats
 from ..carried import carrying
-from ..core.geometry.connected import connected, parts_of
+from ..core.geometry.edges import connected, parts_of
 from ..core.geometry.spaces import inverse, transform
 from ..field_modifier import motion
 from ..handles.empties import matrix_of

@@ -6,14 +6,13 @@ import numpy as np
 
 from ..blender import host
 from ..blender.host import redraw
-from ..blender.object_references import owner_of
+from ..blender.object_references import owner_of, select_alone
 from ..blender.property_definitions import flag, number
-from ..blender.selection import select_alone
 from ..blender.source_operator import ReportingOperator
 from ..core.errors import UserError
 from ..core.runtime import native
 from ..live import sessions
-from ..live.prefetch import prefetch
+from ..live.live_solver import prefetch
 from ..names import TOOL
 from . import drag, hints, pins, screen
 from .hover import View, hover, under

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..blender import modifier_stack, object_references, selection
+from ..blender import modifier_stack, object_references
 from ..blender.language import translated
 from ..blender.object_references import owner_of, settings_of
 from ..blender.property_definitions import listeners
@@ -15,9 +15,9 @@ from ..core.geometry.handles import box_matrix
 from ..core.geometry.spaces import inverse
 from ..core.runtime import jobs
 from ..field_modifier import layers, motion
-from ..handles import empties, movers, naming
+from ..handles import empties, movers
 from ..live import sessions
-from ..results import placement, visibility
+from ..results import placement
 from . import places
 
 REACH_STEP = 1.1  # factor of a handle's reach per step of the mouse wheel
@@ -52,7 +52,7 @@ def handles_in_view(context):
     for source in context.view_layer.objects:
         if not settings_of(source).handles or not object_references.is_source(source):
             continue
-        if any(shape.visible_get() for shape in visibility.family(source)):
+        if any(shape.visible_get() for shape in placement.source_and_results(source)):
             entries = [entry for entry in empties.used(source) if entry.kind != "BONE"]
             handles += [(source, entry) for entry in entries if entry.empty.visible_get()]
     return handles
@@ -154,8 +154,8 @@ def name(source, weights):
     """A pin's name: the vertex group with most weight there, else an unused numbered name."""
     best = max(weights, key=weights.get, default=None)
     if best is not None and weights[best] >= MAJORITY:
-        return naming.name_of_group(best)
-    return naming.numbered(source, "PIN")
+        return empties.name_of_group(best)
+    return empties.numbered(source, "PIN")
 
 
 def choose(context, empty):
@@ -165,10 +165,10 @@ def choose(context, empty):
     index, is_new = empties.find(source, empty), False
     shown = source if source.visible_get() else empty  # the shape may be another object's
     if layer.objects.active != shown or not shown.select_get():
-        selection.select_alone(context, shown)
+        object_references.select_alone(context, shown)
         is_new = True
     if settings_of(source).active_handle != index:
-        selection.choose_row(settings_of(source), index)
+        object_references.choose_row(settings_of(source), index)
         is_new = True
     return is_new
 

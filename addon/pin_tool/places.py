@@ -12,9 +12,8 @@ from mathutils.geometry import barycentric_transform, closest_point_on_tri
 
 from ..blender import mesh_arrays, modifier_stack, point_data
 from ..core.errors import UserError
-from ..core.geometry.connected import connected
-from ..core.geometry.rotations import best_rotation
-from ..core.geometry.spaces import transform
+from ..core.geometry.edges import connected
+from ..core.geometry.spaces import best_rotation, transform
 from ..handles.empties import matrix_of
 
 CANDIDATES = 64  # number of triangles to search if the face is unknown

@@ -9,9 +9,9 @@ from ..blender.mesh_arrays import positions
 from ..blender.object_references import settings_of
 from ..blender.splat_layouts import holds_splats
 from ..carried.carrying import Carrying
-from ..carried.world_matrices import array
+from ..carried.transforms import array
 from ..core.errors import UserError
-from ..core.geometry import rotations
+from ..core.geometry import spaces
 from ..core.geometry.spaces import Space
 from ..core.poses import Pose
 from ..core.runtime import native
@@ -57,7 +57,7 @@ def apply(context, source, pose, strength):
         ) from error
     offsets, turns = strength * (pose.to_local(posed) - points), None
     if has_free_normals:
-        turns = strength * rotations.turns(pose.field.jacobian(rest), pose.local_to_solve)
+        turns = strength * spaces.turns(pose.field.jacobian(rest), pose.local_to_solve)
     carrying = Carrying(context, source)
     space = Space(pose.local_to_solve, array(world_matrix(source)) @ np.linalg.inv(pose.local_to_solve))
     carried = carrying.poses(space, depsgraph_of(context))

@@ -13,7 +13,7 @@ from ..field_modifier import layers, motion
 from ..jobs.job_operator import JobOperator
 from ..properties.choices import extraction, surface
 from ..surface.source_surface import read_surface
-from . import placement, removal, result_objects, visibility
+from . import placement, result_objects
 
 
 class FieldOperator(SourceOperator):
@@ -60,7 +60,7 @@ class ARAPFIELDS_OT_remove_field(FieldOperator, bpy.types.Operator):
     bl_label = "Remove"
 
     def change(self, context, source):
-        reason = removal.take_off(context, source)
+        reason = placement.take_off(context, source)
         if reason is not None:
             self.report({"WARNING"}, translated(reason))
 
@@ -91,7 +91,7 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
                 bpy.context, owner, "EXTRACT", "SURFACE", result_objects.surface_mesh(owner, *mesh), report
             )
             said = translated("{name} with {count} triangles", name=item.name, count=f"{len(mesh[1]):,}")
-            return said + visibility.hidden_note(visibility.show_alone(owner, item))
+            return said + placement.hidden_note(placement.show_alone(owner, item))
 
         return Item(source.name, work, apply)
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Places a solve's result: in the modifier, a new object, the mesh itself, or a shape key."""
+"""Where results go, which of a source and its results is seen, and how the last is taken off."""
 
+import contextlib
 import json
 from dataclasses import dataclass, field
 
@@ -10,16 +11,124 @@ from mathutils import Matrix
 
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.evaluation import is_driven, with_ancestors
-from ..blender.object_references import settings_of
+from ..blender.language import translated
+from ..blender.object_references import in_scene, settings_of
 from ..blender.property_definitions import effective_value
 from ..blender.splat_layouts import holds_splats
+from ..carried import carrying, rest_bones
 from ..core.errors import UserError, refuse
 from ..core.geometry.edges import Topology
 from ..core.geometry.spaces import space_of
-from ..field_modifier import armatures, layers, motion
+from ..field_modifier import field_nodes, layers, motion
 from ..handles import empties
+from ..handles.held_counts import Followers
 from ..names import REPORT
 from . import result_objects
+
+# Shows only the newest of a source and its result objects in one place, and hides the others.
+
+
+def source_and_results(source):
+    """The source, and its result objects that are in a scene."""
+    results = [entry.item for entry in settings_of(source).results if in_scene(entry.item)]
+    return [source, *(item for item in results if item != source)]
+
+
+def show_alone(source, shown, for_now=False):
+    """Hides the rest of the family in the same place as `shown` in viewports and renders, and unhides `shown`
+    if it was set aside; `for_now`: until `give_back`. Returns the names of hidden objects.
+
+    If the user hides `shown`, or its collection, nothing else changes.
+    """
+    if settings_of(shown).set_aside:
+        set_aside(shown, False, for_now)
+    if shown != source and not shown.visible_get():
+        return [shown.name]
+    names = []
+    for item in source_and_results(source):
+        seen = not (item.hide_render and item.hide_get())
+        if item != shown and seen and (item == source or is_where(shown, item)):
+            names.append(item.name)
+            set_aside(item, True, for_now)
+    return names
+
+
+def hidden_note(names):
+    """Text that names hidden objects, to append to a result's name; empty without any."""
+    if not names:
+        return ""
+    one = translated("{name} is hidden", name=names[0])
+    return f" ({translated('{names} are hidden', names=', '.join(names)) if names[1:] else one})"
+
+
+def is_where(shown, item):
+    return np.allclose(item.matrix_world, shown.matrix_world, rtol=1e-5, atol=1e-5)
+
+
+def set_aside(item, aside, for_now):
+    settings = settings_of(item)
+    if for_now and not settings.live_hidden:
+        settings.live_hidden = json.dumps([item.hide_get(), item.hide_render, settings.set_aside])
+    settings.set_aside = aside
+    set_hidden(item, aside, aside)
+
+
+def set_hidden(item, hidden, hidden_in_renders):
+    item.hide_render = hidden_in_renders
+    with contextlib.suppress(RuntimeError):  # in a collection that the view layer leaves out
+        item.hide_set(hidden)
+
+
+def give_back(source):
+    """Restores the family's visibility from before `for_now`."""
+    for item in source_and_results(source):
+        settings = settings_of(item)
+        if settings.live_hidden:
+            hidden, hidden_in_renders, settings.set_aside = json.loads(settings.live_hidden)
+            set_hidden(item, hidden, hidden_in_renders)
+            settings.live_hidden = ""
+
+
+def show_landmarks(source, shown):
+    """Shows or hides the landmarks of a source's wrap in viewports; those elsewhere stay as they are."""
+    for entry in settings_of(source).wrap.landmarks:
+        for item in (entry.rest, entry.on_target):
+            if item is not None:
+                with contextlib.suppress(RuntimeError):  # in a collection that the view layer leaves out
+                    item.hide_set(not shown)
+
+
+def keep_visibility(source):
+    """Makes visibility set `for_now` permanent."""
+    for item in source_and_results(source):
+        settings_of(item).live_hidden = ""
+
+
+# Takes the last result off its source.
+
+
+def take_off(context, source):
+    """Removes the modifier of the last result with its motion; the result below it is the last one then.
+    Returns an error of bones that cannot be put back, or None."""
+    reason = None
+    layers.uncover(source, baked=True)
+    followers = Followers(context, source) if settings_of(source).moved_by == "WRAP" else None
+    try:
+        if not modifier_stack.layers(source):
+            rest_bones.reset(context, source)
+    except UserError as error:
+        reason = error
+    motion.remove(source)
+    layers.uncover(source)
+    carrying.give_back_all(source)
+    field_nodes.clear(source)
+    if followers is not None:
+        followers.follow(context, source, back=True)
+        show_landmarks(source, True)
+    return reason
+
+
+# Places a solve's result: in the modifier, a new object, the mesh itself, or a shape key.
 
 
 @dataclass
@@ -96,7 +205,7 @@ def place_result(context, source, kind, output, result, moved, before):
     else:
         single_user(source)
         mesh_arrays.set_positions(source.data, moved.vertices)
-    armatures.silence(source)
+    motion.silence_armatures(source)
     motion.discard(source)  # the mesh contains its motion now
     if source.data.shape_keys is None:
         layers.discard(source)

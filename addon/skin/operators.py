@@ -15,7 +15,6 @@ from ..core.settings.choices import SKINNED
 from ..core.settings.parameters import SKIN
 from ..jobs.job_operator import JobOperator, busy
 from ..names import Op
-from . import rig as rigs
 from . import writing
 from .properties import groups
 
@@ -36,10 +35,10 @@ class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
 
     @classmethod
     def obstacle(cls, context):
-        rig = rigs.rig_of(context)
-        meshes = rigs.meshes_of(context, rig, "COLLECTION") if rig else []
-        chosen = rigs.meshes_of(context, rig, "SELECTED") if rig else []
-        return native.problem() or busy() or rigs.refusal(rig, chosen or meshes)
+        rig = writing.rig_of(context)
+        meshes = writing.meshes_of(context, rig, "COLLECTION") if rig else []
+        chosen = writing.meshes_of(context, rig, "SELECTED") if rig else []
+        return native.problem() or busy() or writing.refusal(rig, chosen or meshes)
 
     def prepare(self, context, job):
         """Coroutine: the one item of the job, of all meshes together."""
@@ -53,20 +52,20 @@ class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
 
     def plan_all(self, context):
         context.view_layer.update()
-        rig = rigs.rig_of(context)
-        meshes = rigs.meshes_of(context, rig, self.scope) if rig else []
-        refuse(rigs.refusal(rig, meshes))
+        rig = writing.rig_of(context)
+        meshes = writing.meshes_of(context, rig, self.scope) if rig else []
+        refuse(writing.refusal(rig, meshes))
         settings = settings_of(rig).skin
         values = effective_values(SKIN, settings, self)
         kept_groups = effective_value("groups", settings, self)
         af, options = native.library(), options_of("skin", values)
-        with rigs.at_rest(context, rig):
+        with writing.at_rest(context, rig):
             read = [writing.read(context, item, rig, kept_groups) for item in meshes]
-        bones = rigs.bones_of(af, rig)
+        bones = writing.bones_of(af, rig)
         names = [bone.name for bone in bones]
         vertices, triangles, firsts = writing.join(read)
         painted = writing.joined_stiffness(read)
-        reference, rest = ObjectReference(rig), rigs.rest_of(rig)
+        reference, rest = ObjectReference(rig), writing.rest_of(rig)
 
         def work(tracker):
             share = 0.4 if options.correctives else 1.0
@@ -94,9 +93,9 @@ class ARAPFIELDS_OT_skin(JobOperator, bpy.types.Operator):
         def apply(solved):
             weights, correctives = solved
             armature = reference.get()
-            if rigs.rest_of(armature) != rest:
+            if writing.rest_of(armature) != rest:
                 raise UserError("{name} changed while it was worked on; run again", armature)
-            with rigs.at_rest(bpy.context, armature):
+            with writing.at_rest(bpy.context, armature):
                 items = [shape.get(armature) for shape in read]
             for item, shape, own, first in zip(items, read, weights, firsts, strict=False):
                 writing.write_weights(item, names, own, shape.kept)
@@ -143,18 +142,18 @@ class ARAPFIELDS_PT_skin(Section, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        wanted = rigs.rig_of(context) is not None or source_of(context) is not None
+        wanted = writing.rig_of(context) is not None or source_of(context) is not None
         return super().poll(context) and wanted
 
     def fill(self, context, source, settings):
-        layout, rig = self.layout, rigs.rig_of(context)
-        meshes = rigs.meshes_of(context, rig, "SELECTED") if rig else []
+        layout, rig = self.layout, writing.rig_of(context)
+        meshes = writing.meshes_of(context, rig, "SELECTED") if rig else []
         if rig is not None:
             group = settings_of(rig).skin
             settings_column(layout, group, SKIN, advanced=False)
             draw_settings(layout, group, "groups")
         job_button(layout, Op.SKIN, "MOD_ARMATURE")
-        note(layout, rigs.refusal(rig, meshes))
+        note(layout, writing.refusal(rig, meshes))
 
 
 class ARAPFIELDS_PT_skin_settings(Advanced, bpy.types.Panel):
@@ -165,10 +164,10 @@ class ARAPFIELDS_PT_skin_settings(Advanced, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and rigs.rig_of(context) is not None
+        return super().poll(context) and writing.rig_of(context) is not None
 
     def fill(self, context, source, settings):
-        settings_column(self.layout, settings_of(rigs.rig_of(context)).skin, SKIN, advanced=True)
+        settings_column(self.layout, settings_of(writing.rig_of(context)).skin, SKIN, advanced=True)
 
 
 CLASSES = [

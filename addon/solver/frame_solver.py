@@ -1,21 +1,256 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver of live mode, bakes and exports: a request in, a shape out."""
+"""Requests, and the solver, set up once, that turns each into a shape from rest, deformed or stylized."""
 
-from dataclasses import dataclass, field, replace
+import hashlib
+import math
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from ..blender.property_definitions import options_of
+from ..blender import vertex_groups
+from ..blender.property_definitions import effective_values, options_of
+from ..carried.carrying import CarriedPose
 from ..core.errors import UserError
 from ..core.geometry.edges import Topology
 from ..core.runtime import native
-from ..core.settings.parameters import presets
-from ..handles.native_handles import native_handles
-from ..surface.source_surface import PointsBefore
-from .contact import native_contact
-from .request import Request
-from .setup import at_samples
-from .stylization import stylization
+from ..core.runtime.jobs import ProgressTracker
+from ..core.settings.choices import STYLIZE
+from ..core.settings.parameters import DEFORM, is_fast, presets
+from ..handles.native_handles import held_points, native_handles
+from ..surface.source_surface import PointsBefore, SourceSurface
+from .contact import ContactTerm, native_contact
+from .secondary_motion import SecondaryMotion
+
+# The input of a solver, read on the main thread, and the samples that a worker derives from it once.
+
+SAMPLES = 6000
+# Panel options that are weights of energy terms, and whether a style is finished on the mesh.
+ENERGY = {
+    "bending",
+    "bending_unit",
+    "barrier",
+    "handle_weight",
+    "symmetry",
+    "rigidity",
+    "keep_stance",
+    "finish",
+    "locality",
+}
+
+
+@dataclass(frozen=True)
+class SolverSetup:
+    """A source with its handles at rest; (n,) weights are those of the vertices, None for 1 everywhere."""
+
+    kind: str  # DEFORM or STYLIZE
+    surface: SourceSurface
+    cells: int | None  # resolution of the implicit surface to move; None: the source's points are moved
+    energy: dict  # weights of the energy's terms, by name
+    machine: dict  # options that depend on the machine
+    handles: list = ()
+    region: np.ndarray | None = None  # weights with which a style acts
+    masses: np.ndarray | None = None  # each vertex's share of secondary motion
+    start: int = 1  # frame at which secondary motion begins
+    fps: float = 24.0
+    samples: int | None = None  # of the surface; None: SAMPLES
+    seed: int = 0  # of their choice
+
+
+@dataclass(frozen=True)
+class SampledSource:
+    """A setup's samples with their weights; several solvers may share it."""
+
+    setup: SolverSetup
+    samples: object
+    region: np.ndarray | None  # weights of the samples
+    masses: np.ndarray | None
+    rest: np.ndarray | None = None  # (k, 3) vertices of the implicit surface, if that is moved
+    topology: Topology | None = None
+
+
+def sampled(setup, count=None, seed=None):
+    """The SampledSource of a setup, of its own samples unless a count and a seed are given; on a worker."""
+    count = count or setup.samples or SAMPLES
+    seed = setup.seed if seed is None else seed
+    surface, tracker = setup.surface, ProgressTracker(native.library().Task)
+    moves_points = setup.cells is None
+    samples = surface.samples(tracker, count, seed, own_triangles=surface.exact and moves_points)
+    weights = [at_samples(setup, values, samples) for values in (setup.region, setup.masses)]
+    if moves_points:
+        return SampledSource(setup, samples, *weights)
+    return SampledSource(setup, samples, *weights, *surface.extract(tracker, 0.1, resolution=setup.cells))
+
+
+def at_samples(setup, weights, samples):
+    """Vertex weights interpolated at the samples."""
+    if weights is None:
+        return None
+    return vertex_groups.at_points(setup.surface.vertices, weights, samples.points)
+
+
+def energy_weights(settings, kind):
+    """The weights of the energy's terms by name, as the panel of that kind of solve has them."""
+    shown, group = (DEFORM, settings.deform) if kind == "DEFORM" else (STYLIZE, settings.stylize)
+    weights = effective_values([option for option in shown if option.name in ENERGY], group)
+    held = [option for option in DEFORM if option.name == "handle_weight"]
+    return weights | effective_values(held, settings.deform)
+
+
+# Requests, and the solver that turns each into a shape from rest, deformed or stylized.
+
+# A pose that a solver turns into a shape, read on the main thread.
+
+
+class StyleTerm(NamedTuple):
+    """A style's parameters for the solver; terms of equal `key` are equal."""
+
+    key: tuple
+    directions: object  # (k, 3) preferred normals in solve space, or the ObjectStyle there
+    strength: float
+    sharpness: float
+    up: np.ndarray  # (3,)
+
+    @property
+    def what(self):
+        """The key without strength and sharpness."""
+        return self.key[:-2]
+
+
+class Request(NamedTuple):
+    """One pose. Requests that are alike have the same shape when solved from rest."""
+
+    targets: list  # the handles' targets: (4, 4), or (3,) for a point, in solve space
+    style: StyleTerm | None
+    points: np.ndarray  # (n, 3) the source's points before the field, in local coordinates
+    handles: list  # at rest
+    energy: dict  # weights of the energy's terms, by name
+    carried: list  # carried.carried_objects.CarriedPose of each carried object
+    motion: SecondaryMotion | None
+    contact: ContactTerm | None = None
+
+    @property
+    def style_key(self):
+        return None if self.style is None else self.style.key
+
+    @property
+    def contact_key(self):
+        return None if self.contact is None else self.contact.key
+
+    def goes_on_from(self, earlier):
+        """Whether a solve may start from the shape of an earlier one: handles or a slider are dragged."""
+        what, before = (None if one.style is None else one.style.what for one in (self, earlier))
+        return what == before
+
+    def digest(self, *further):
+        """Hash of the request and of `further`, parameters of its source; equal for equal shapes."""
+        carried = [(pose.points, pose.rest, pose.now, pose.parent) for pose in self.carried]
+        hashed = hashlib.sha1()
+        parts = self.targets, self.style_key, self.points, self.handles, self.energy, carried, self.motion
+        parts += (self.contact_key,)
+        for part in flat((parts, further)):
+            hashed.update(part)
+        return hashed.hexdigest()
+
+    def is_like(self, other):
+        """Whether both ask for the same shape."""
+        return (
+            self.style_key == other.style_key
+            and self.energy == other.energy
+            and self.motion == other.motion
+            and self.contact_key == other.contact_key
+            and self.handles is other.handles
+            and (self.points is other.points or np.array_equal(self.points, other.points))
+            and len(self.carried) == len(other.carried)
+            and all(map(CarriedPose.same, self.carried, other.carried))
+            and len(self.targets) == len(other.targets)
+            and all(map(np.array_equal, self.targets, other.targets))
+        )
+
+
+def flat(value):
+    """Yields the bytes of a value, recursively through containers and dataclasses."""
+    if isinstance(value, np.ndarray):
+        yield value.tobytes()
+    elif is_dataclass(value):
+        yield from flat([getattr(value, one.name) for one in fields(value)])
+    elif isinstance(value, dict):
+        yield from flat(sorted(value.items()))
+    elif isinstance(value, tuple | list):
+        yield b"("
+        for one in value:
+            yield from flat(one)
+    else:
+        yield repr(value).encode()
+
+
+# A style's solve from rest, and its finish on the mesh's vertices: of the operator, live mode and bakes.
+
+
+@dataclass(frozen=True)
+class Stylization:
+    """Made by stylization(), used on a worker."""
+
+    directions: object  # (k, 3) preferred normals in solve space, or the ObjectStyle there
+    up: np.ndarray  # (3,)
+    options: object  # native StylizeOptions
+    finish: object  # native SharpenOptions, or None
+    handles: list  # core.geometry.handles.Handle; what they hold stays where the field has it
+    region: np.ndarray | None  # (n,) weights of the source's vertices, with which the style acts
+    contact: ContactTerm | None
+    alone: bool  # whether the style alone moves the surface: strength is then the share of the whole way
+
+    def field(self, surface, samples, task, distances=None):
+        """The field. `distances`: {key of a Solid: MeshSdf} that is known, and added to."""
+        af, weights = native.library(), self.region
+        return af.stylize(
+            samples,
+            self.directions,
+            self.options,
+            weights=None if weights is None else at_points(surface, weights, samples.points),
+            up=self.up,
+            handles=native_handles(af, self.handles, surface, samples, reaches=False),
+            contact=native_contact(self.contact, distances),
+            task=task,
+        )
+
+    def finished(self, surface, points, triangles, moved, task, distances=None):
+        """(k, 3) positions of `moved` points, of which `points` (k, 3) are those at rest, in solve space;
+        `distances` as of field()."""
+        if self.finish is None or triangles is None:
+            return moved
+        weights = self.region
+        if weights is not None and points is not surface.vertices:
+            weights = at_points(surface, weights, points)
+        if self.handles:
+            held = held_points(self.handles, surface, points)
+            weights = np.where(held, 0.0, 1.0 if weights is None else weights)
+        up = None if self.handles else self.up
+        contact = native_contact(self.contact, distances)
+        further = {"weights": weights, "up": up, "contact": contact, "alone": self.alone, "task": task}
+        return native.library().sharpen(points, triangles, moved, self.directions, self.finish, **further)
+
+
+def stylization(values, directions, up, handles, region, contact, machine=None):
+    """The Stylization of settings by name; `machine` as of options_of()."""
+    finish = None
+    if values["finish"] and not (contact is not None and contact.itself):
+        shared = {name: values[name] for name in ("strength", "sharpness", "rigidity")}
+        finish = options_of("sharpen", shared, machine)
+        af = native.library()
+        iterations = min(values.get("iterations", math.inf), af.ITERATIONS_BEFORE_SHARPEN)
+        values = values | {"centers": af.CENTERS_BEFORE_SHARPEN, "iterations": iterations}
+    options = options_of("stylize", values, machine)
+    is_radial = "field" not in values or is_fast(values, STYLIZE)  # live mode knows no other
+    alone = is_radial and not handles
+    return Stylization(directions, up, options, finish, handles, region, contact, alone)
+
+
+def at_points(surface, weights, points):
+    return vertex_groups.at_points(surface.vertices, weights, points)
+
+
+# The solver of live mode, bakes and exports: a request in, a shape out.
 
 REST_STEPS, FINE_TOLERANCE = 400, 1e-6  # of a solve from rest: to convergence
 STYLE = presets("live").get("STYLE")  # preset for styles: label, tip, options

@@ -21,8 +21,7 @@ from ..surface.source_surface import read_surface
 from . import secondary_motion, style_settings
 from .contact import contact_of
 from .frame_range import involved
-from .request import Request, StyleTerm
-from .setup import SolverSetup, energy_weights
+from .frame_solver import Request, SolverSetup, StyleTerm, energy_weights
 
 PREVIEW_CELLS = 96  # highest resolution of an implicit surface to move
 

@@ -1,19 +1,112 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The style that an object's settings choose: preferred normals, their axes, and where it acts."""
+"""The style of a solve, by its settings or by the shape of an object."""
 
 from dataclasses import dataclass
 
+import bmesh
+import bpy
 import numpy as np
 
-from ..blender import modifier_stack, vertex_groups
+from ..blender import mesh_arrays, modifier_stack, vertex_groups
+from ..blender.evaluation import depsgraph_of
 from ..blender.object_references import settings_of
 from ..blender.property_definitions import effective_value
 from ..core.errors import UserError
 from ..core.geometry.spaces import pose, upright
+from ..core.runtime import native
 from ..core.settings.choices import CUSTOM, style_name
 from ..handles import empties
 from ..handles.empties import matrix_of
-from . import style_object
+
+# A mesh object as a style: its native ObjectStyle, cached by a fingerprint of mesh and matrix.
+
+MOST_NORMALS = 64  # face normals of an object without a volume; with more it is no style
+KEPT = 8  # size of the cache: objects, or orientations of one
+style_cache = {}  # key → ObjectStyle or (k, 3) normals
+
+
+def object_refusal(item):
+    """UserError if an object cannot be a style, without reading its mesh; else None."""
+    if item.type != "MESH":
+        return UserError("{name} is no mesh; a mesh object is needed as a style", item)
+    return None
+
+
+def style_of(item, where=matrix_of):
+    """(style, key): an ObjectStyle in the world's directions, or the (k, 3) face normals of an object without
+    a volume; equal keys for equal styles. UserError that names the object if it gives neither."""
+    reason = object_refusal(item)
+    if reason is not None:
+        raise reason
+    linear = np.asarray(where(item), dtype=np.float64)[:3, :3]
+    seen = item if modifier_stack.find(item) else item.evaluated_get(depsgraph_of(bpy.context))
+    mesh = seen.to_mesh()
+    try:
+        key = mesh_arrays.fingerprint(mesh), linear.tobytes()
+        if key not in style_cache:
+            while len(style_cache) >= KEPT:
+                del style_cache[next(iter(style_cache))]
+            style_cache[key] = _read(item.name, mesh, linear)
+        return style_cache[key], key
+    finally:
+        seen.to_mesh_clear()
+
+
+def _read(name, mesh, linear):
+    reason = mesh_arrays.nothing_in(name, len(mesh.vertices), len(mesh.polygons))
+    if reason is not None:
+        raise reason
+    af = native.library()
+    points, corners = mesh_arrays.positions(mesh) @ linear.T, mesh_arrays.triangles(mesh)
+    for close in (False, True):
+        if close:
+            points, corners = _closed(points, corners)
+        try:
+            return af.ObjectStyle(points, corners)
+        except af.InvalidInput:
+            continue
+    return _face_normals(name, mesh, linear)
+
+
+def _closed(points, corners):
+    """The mesh with coincident vertices merged and its holes filled."""
+    points, which = np.unique(points, axis=0, return_inverse=True)
+    closed = bmesh.new()
+    vertices = [closed.verts.new(point) for point in points]
+    for a, b, c in which.reshape(-1)[corners]:
+        if len({a, b, c}) == 3 and not closed.faces.get((vertices[a], vertices[b], vertices[c])):
+            closed.faces.new((vertices[a], vertices[b], vertices[c]))
+    bmesh.ops.holes_fill(closed, edges=[edge for edge in closed.edges if edge.is_boundary], sides=0)
+    bmesh.ops.recalc_face_normals(closed, faces=closed.faces)
+    bmesh.ops.triangulate(closed, faces=closed.faces)
+    closed.verts.index_update()
+    points = np.array([vertex.co for vertex in closed.verts], dtype=np.float64).reshape(-1, 3)
+    corners = np.array([[v.index for v in face.verts] for face in closed.faces], dtype=np.int64).reshape(
+        -1, 3
+    )
+    closed.free()
+    return points, corners
+
+
+def _face_normals(name, mesh, linear):
+    """(k, 3) distinct unit normals of the faces, in world space."""
+    normals = np.empty(3 * len(mesh.polygons), dtype=np.float32)
+    mesh.polygons.foreach_get("normal", normals)
+    turned = normals.reshape(-1, 3).astype(np.float64) @ np.linalg.pinv(linear)  # by the inverse transpose
+    turned = turned[np.linalg.norm(turned, axis=1) > 0]
+    turned = np.unique(np.round(turned / np.linalg.norm(turned, axis=1, keepdims=True), 3), axis=0)
+    if not 0 < len(turned) <= MOST_NORMALS:
+        raise UserError(
+            "{name} encloses no volume, and has {count} different face normals; a closed object, or from 1 "
+            "to {most} normals, make a style",
+            name=name,
+            count=len(turned),
+            most=MOST_NORMALS,
+        )
+    return turned / np.linalg.norm(turned, axis=1, keepdims=True)
+
+
+# The style that an object's settings choose: preferred normals, their axes, and where it acts.
 
 
 @dataclass(frozen=True)
@@ -58,7 +151,7 @@ def missing_object(which, frame, settings):
         if settings.style_object is None:
             return UserError("Choose the object that gives the style its normals")
         if which == "OBJECT":
-            return style_object.refusal(settings.style_object)
+            return object_refusal(settings.style_object)
     elif frame == "EMPTY" and settings.frame_object is None:
         return UserError("Choose the object along whose axes the style stands")
     return None
@@ -78,7 +171,7 @@ def requested_style(settings, space, operator=None, where=matrix_of):
     up = to_solve[:, 2]
     if which in CUSTOM:
         if which == "OBJECT":
-            normals, key = style_object.style_of(settings.style_object, where)
+            normals, key = style_of(settings.style_object, where)
             return Style(normals, to_solve, up, key)
         turn = pose(where(settings.style_object))[:3, :3]
         return Style(np.concatenate([np.eye(3), -np.eye(3)]), to_solve @ turn, up, which)

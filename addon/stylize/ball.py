@@ -6,7 +6,7 @@ import numpy as np
 from ..blender import icons
 from ..core.errors import UserError
 from ..core.runtime import native
-from ..solver import style_object
+from ..solver import style_settings
 
 SIZE, FINER = 32, 2
 # As in the pictures of the other styles (blender_scripts/style_icons.py): from where, the light, the colours.
@@ -19,7 +19,7 @@ NAME = "STYLE_OBJECT"
 def icon(item):
     """The icon_id of an object as a style; 0 if it cannot be one."""
     try:
-        style, key = style_object.style_of(item)
+        style, key = style_settings.style_of(item)
     except (UserError, native.library().InvalidInput):
         return 0
     return icons.drawn(NAME, key, SIZE, lambda: picture(style))

@@ -4,9 +4,9 @@ import bpy
 from ..blender.evaluation import world_matrix
 from ..blender.host import has_window
 from ..blender.object_references import settings_of
-from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_values
 from ..blender.source_operator import SourceOperator
+from ..blender.user_preferences import preset_classes
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.choices import STYLIZE
@@ -16,7 +16,7 @@ from ..handles import empties
 from ..properties.choices import orientation, result_properties, style
 from ..solver import style_settings
 from ..solver.contact import for_job
-from ..solver.stylization import stylization
+from ..solver.frame_solver import stylization
 
 
 class ARAPFIELDS_OT_stylize(SolveOperator, bpy.types.Operator):

@@ -8,7 +8,6 @@ import bpy
 from ..blender import mesh_arrays, object_references
 from ..blender.language import translated
 from ..blender.object_references import settings_of
-from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, flag
 from ..blender.section import (
     Advanced,
@@ -21,14 +20,14 @@ from ..blender.section import (
     wrapped,
 )
 from ..blender.source_operator import ReportingOperator
-from ..blender.user_preferences import fit_cache
+from ..blender.user_preferences import fit_cache, preset_classes
 from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..core.settings.parameters import FIT
 from ..jobs.job_operator import JobOperator, busy
 from ..names import Op
 from ..properties.choices import quality
-from . import surface_fit
+from . import source_surface
 from .source_surface import read_surface
 
 
@@ -56,7 +55,7 @@ class ARAPFIELDS_OT_fit(JobOperator, bpy.types.Operator):
         def apply(sdf):
             source = surface.reference.get()
             if surface.fit.is_cached:
-                surface_fit.mark_fitted(source, surface)
+                source_surface.mark_fitted(source, surface)
                 settings = settings_of(source)
                 settings.fit_key = surface.fit.key
                 settings.fit_report = json.dumps(sdf.report.to_dict())
@@ -141,7 +140,7 @@ class ARAPFIELDS_PT_surface(Advanced, bpy.types.Panel):
             layout.label(text="Not fitted yet", icon="INFO")
             return
         kept = fit_cache().path(settings.fit_key).exists()
-        stale = surface_fit.reason(source)
+        stale = source_surface.outdated(source)
         layout.label(
             text=(stale or "Fit in the cache") if kept else "Fit was cleared",
             icon="CHECKMARK" if kept and not stale else "ERROR",

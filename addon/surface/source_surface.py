@@ -1,24 +1,121 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One source's surface, samples and extraction: read on the main thread, computed on the worker."""
+"""One source's surface, samples, fit and extraction: read on the main thread, computed on the worker."""
 
+import json
 from dataclasses import dataclass
 from functools import cached_property
 
+import bpy
 import numpy as np
 
-from ..blender import mesh_arrays, modifier_stack
+from ..blender import mesh_arrays, modifier_stack, user_preferences
 from ..blender.evaluation import world_matrix
 from ..blender.object_references import ObjectReference, settings_of
+from ..blender.property_definitions import effective_values, options_of
 from ..blender.splat_layouts import Splats
 from ..blender.vertex_groups import NearestVertices
 from ..core.errors import UserError
-from ..core.geometry import rotations
+from ..core.geometry import spaces
 from ..core.geometry.edges import build_edges, most_frequent
 from ..core.geometry.spaces import Space, space_of
 from ..core.runtime import native
-from ..handles import subdivided
+from ..core.runtime.fit_cache import fit_key
+from ..core.settings.parameters import FIT, QUALITIES, native_options
+from ..field_modifier import motion
+from ..handles import native_handles
 from ..stiffness import painted
-from .surface_fit import SurfaceFit, read_fit
+
+# The neural implicit surface fitted to a source's mesh, cached on disk, and whether it is out of date.
+
+# The neural implicit surface fitted to a source's mesh, cached on disk.
+
+VERSION = 1  # increased when fits of earlier versions must not be used
+
+
+class SurfaceFit:
+    """A fit of (n, 3) vertices and (m, 3) triangles with these options; computed once, on a worker."""
+
+    def __init__(self, vertices, triangles, options, machine, cache):
+        self.vertices, self.triangles, self.options = vertices, triangles, options
+        self._machine, self._cache, self._surface = machine, cache, None
+
+    @cached_property
+    def key(self):
+        """Key of the fit in the cache; hashing a large mesh is slow, so only workers use it."""
+        return fit_key(self.vertices, self.triangles, self.options, VERSION)
+
+    @property
+    def is_cached(self):
+        return self._cache.path(self.key).exists()
+
+    def surface(self, tracker, weight, again=False):
+        """The fitted surface, from the cache unless `again` is set."""
+        if self._surface is None:
+            cached = None if again else self._cache.load(self.key, native.library().NeuralSdf.load)
+            self._surface = self._fitted(tracker, weight) if cached is None else cached
+        return self._surface
+
+    def _fitted(self, tracker, weight):
+        options = options_of("fit", self.options, self._machine)
+        task = tracker.start("Fitting", weight)
+        sdf = native.library().fit_sdf(self.vertices, self.triangles, options, task=task)
+        try:
+            self._cache.save(self.key, sdf.save)
+        except (ValueError, OSError) as error:
+            tracker.warnings.append(UserError("The fit is used, but could not be kept: {error}", error=error))
+        return sdf
+
+
+def read_fit(settings, operator, vertices, triangles):
+    """The SurfaceFit of a mesh by the settings; main thread."""
+    options = native_options("fit", fit_values(settings.fit, operator))
+    machine, cache = user_preferences.machine_options(), user_preferences.fit_cache()
+    return SurfaceFit(vertices, triangles, options, machine, cache)
+
+
+def fit_values(group, operator):
+    """The effective settings of the fit; an operator's `quality` overrides the object's other settings."""
+    values = effective_values(FIT, group, operator)
+    if operator is not None and operator.properties.is_property_set("quality"):
+        preset = QUALITIES[operator.quality][2]
+        values |= {n: v for n, v in preset.items() if not operator.properties.is_property_set(n)}
+    return values
+
+
+# Tracks whether meshes or settings have changed since their fit, by depsgraph updates only.
+
+changed = set()  # session_uid of objects whose geometry was updated since their fit
+
+
+def options_text(settings):
+    """The settings of an object's fit as a comparable text."""
+    return json.dumps(sorted(native_options("fit", fit_values(settings.fit, None)).items()))
+
+
+def mark_fitted(source, surface):
+    """Marks the source's fit as up to date."""
+    changed.discard(source.session_uid)
+    settings_of(source).fit_options = json.dumps(sorted(surface.fit.options.items()))
+
+
+def outdated(source):
+    """Text to translate that says why the last fit is out of date; "" if it is not known to be."""
+    if source.session_uid in changed:
+        return "The mesh changed since the fit"
+    settings = settings_of(source)
+    return "The settings changed since the fit" if settings.fit_options != options_text(settings) else ""
+
+
+def watch(depsgraph):
+    """Records the objects whose geometry a depsgraph has updated."""
+    for update in depsgraph.updates:
+        if update.is_updated_geometry and isinstance(update.id, bpy.types.Object):
+            source = update.id.original
+            if settings_of(source).fit_key and source.session_uid not in motion.written:
+                changed.add(source.session_uid)
+
+
+# One source's surface, samples and extraction: read on the main thread, computed on the worker.
 
 # Points of a source as the modifiers before the field move them, possibly off the surface at rest.
 #
@@ -58,7 +155,7 @@ class PointsBefore:
     def turns(self, field):
         """(k, 3) displacements (R - 1) (p - r - c) of the points `turned`, those with an offset."""
         if self._of[0] is not field:
-            turns = rotations.closest(field.jacobian(self.rest[self.turned]))
+            turns = spaces.closest(field.jacobian(self.rest[self.turned]))
             self._of = field, np.einsum("nij,nj->ni", turns - np.eye(3), self._offsets)
         return self._of[1]
 
@@ -171,7 +268,7 @@ class SourceSurface:
         jacobians = field.jacobian(points)
         if place is not None:
             jacobians = np.linalg.inv(place[:3, :3]) @ jacobians
-        return rotations.turns(jacobians, self.space.local_to_solve)
+        return spaces.turns(jacobians, self.space.local_to_solve)
 
     def extract(self, tracker, weight, **extraction):
         """(k, 3) vertices and the topology of the implicit surface, in solve space.
@@ -251,5 +348,7 @@ def read_surface(
         solids=[] if carrying is None else carrying.solids(context, space),
         splats=in_world_shape(mesh.splats, space, source),
         materials=mesh.materials,
-        shown=None if carrying is None else subdivided.read(context, source, in_place, below, space.to_solve),
+        shown=None
+        if carrying is None
+        else native_handles.read_subdivided(context, source, in_place, below, space.to_solve),
     )

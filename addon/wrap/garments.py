@@ -8,11 +8,10 @@ from ..blender import mesh_arrays, modifier_stack, references
 from ..blender.actions import own_action, remove_curves
 from ..blender.evaluation import depsgraph_of, with_ancestors
 from ..blender.object_references import in_scene, settings_of
-from ..carried import refusals
+from ..carried import carrying
 from ..carried.carrying import carrier_class
 from ..carried.rest_bones import above_field
-from ..carried.transforms import TransformCarrier
-from ..carried.world_matrices import array, at_present_rest, world_matrices
+from ..carried.transforms import TransformCarrier, array, at_present_rest, world_matrices
 from ..core.errors import UserError, refuse
 from ..core.geometry import transfer
 from ..core.geometry.spaces import facing, inverse, transform
@@ -108,7 +107,7 @@ def copies(context, source, target, given, own):
         if not in_scene(item) or item == target or item.type == "ARMATURE":
             continue
         try:
-            refuse(refusals.of_item(source, item))
+            refuse(carrying.of_item(source, item))
             shape, matrix = None, array(item.matrix_world)
             if issubclass(carrier_class(item, entry.way), TransformCarrier):
                 matrix = placed(context, source, item, entry, body)

@@ -20,7 +20,7 @@ from ..core.settings.parameters import WRAP
 from ..jobs.job_operator import JobOperator
 from ..pin_tool import screen
 from ..pin_tool.drawing import CIRCLE, DARK
-from ..results import visibility
+from ..results import placement
 from ..surface.source_surface import read_surface
 from . import landmarks
 
@@ -68,7 +68,7 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
         source = source_of(context)
         self.ends = [ObjectReference(source), ObjectReference(landmarks.target_of(source))]
         self.clicked = {}
-        visibility.show_landmarks(source, True)
+        placement.show_landmarks(source, True)
         self.tell(context)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}

@@ -12,10 +12,9 @@ from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import facing, inverse, transform
 from ..field_modifier import layers
-from ..handles.empties import delete, make_empty, matrix_of
-from ..handles.naming import free_colour
+from ..handles.empties import delete, free_colour, make_empty, matrix_of
 from ..pin_tool import places
-from ..results import visibility
+from ..results import placement
 
 MOST_KNOWN = 1000  # places whose nearest vertices are remembered
 SIZE = 0.02  # of an Empty, as a share of the object's diagonal
@@ -87,7 +86,7 @@ def place(context, source, target, rest, on_target):
 
 def add(context, source, target, pair):
     """Adds a pair at these world locations: on the source at rest, on the target."""
-    visibility.show_landmarks(source, True)
+    placement.show_landmarks(source, True)
     number = len(settings_of(source).wrap.landmarks) + 1
     ends = [
         empty_at(context, source, pair[0], f"Landmark {number}"),

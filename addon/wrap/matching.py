@@ -12,7 +12,7 @@ from ..core.geometry.spaces import is_in_place, mirrors, transform
 from ..core.runtime import native
 from ..handles.empties import matrix_of
 from ..names import NEUTRAL_KEY
-from . import keys
+from . import transfer
 from .transfer import Given
 
 LEAST_POSE = 1e-5  # of the target's size: above the rounding of an armature at rest
@@ -31,9 +31,9 @@ def seen(context, source, target, is_posed):
     kept = [one for one in target.modifiers if is_posed and one.show_viewport and keeps_vertices(one)]
     if not kept and blocks is None:
         return own
-    given = {NEUTRAL_KEY, *(block.name for block in keys.of(source))}  # made after the wrap
+    given = {NEUTRAL_KEY, *(block.name for block in transfer.keys_of(source))}  # made after the wrap
     values = dict.fromkeys(given & set(blocks.key_blocks.keys() if blocks else ()), 0.0)
-    shape = keys.shape_at(context, target, kept, values)
+    shape = transfer.shape_at(context, target, kept, values)
     return shape if len(shape) == len(own) else own
 
 
@@ -48,7 +48,7 @@ class Wrapped:
 
     def __init__(self, source, target):
         self.ends = ObjectReference(source), ObjectReference(target)
-        self.shown_keys, self.mark = json.dumps(keys.shown(source)), mark_of(target)
+        self.shown_keys, self.mark = json.dumps(transfer.shown_values(source)), mark_of(target)
 
     def put(self):
         source, target = (end.find() for end in self.ends)
@@ -82,7 +82,7 @@ class Match:
         is_known = target == wrap.onto and kept.any() and mirrors(kept) == mirrors(self.placement)
         self.kept = kept if is_known else None  # where it lay when it was wrapped
         self.unposed, self.posed = (seen(context, source, target, is_posed) for is_posed in (False, True))
-        self.offsets = keys.offsets(source) if with_keys else None
+        self.offsets = transfer.key_offsets(source) if with_keys else None
 
     def find(self, tracker):
         """Finds the target vertices' correspondence, and the displacements (k, m, 3) of its keys."""
@@ -108,7 +108,7 @@ class Match:
         source, target = (end.get() for end in self.ends)
         now = self.placement if self.is_aside else beside(source, target)
         is_there = is_in_place(transform(now, self.given.moved), self.moved)
-        has_same_keys = self.offsets is None or np.array_equal(keys.offsets(source), self.offsets)
+        has_same_keys = self.offsets is None or np.array_equal(transfer.key_offsets(source), self.offsets)
         if not (is_there and has_same_keys):
             raise UserError("{name} changed while it was worked on; run again", source)
         if mark_of(target) != self.mark:

@@ -8,9 +8,9 @@ from ..blender.evaluation import world_matrix
 from ..blender.host import has_window
 from ..blender.language import about, translated
 from ..blender.object_references import settings_of
-from ..blender.presets import preset_classes
 from ..blender.property_definitions import annotations, effective_value, effective_values, integer, options_of
 from ..blender.source_operator import SourceOperator
+from ..blender.user_preferences import preset_classes
 from ..carried import carrying, rest_bones
 from ..core.errors import UserError, refuse
 from ..core.geometry.handles import nothing_held
@@ -21,12 +21,12 @@ from ..core.settings.parameters import WRAP
 from ..deform.solve_job import SolveOperator, plan_solve_job
 from ..field_modifier import layers
 from ..handles import empties
-from ..handles.following import Followers
+from ..handles.held_counts import Followers
 from ..jobs.job_operator import JobOperator
 from ..properties.choices import result_properties
-from ..results import visibility
+from ..results import placement
 from ..results.placement import holds_place
-from . import keys, landmarks, transfer
+from . import landmarks, transfer
 from .matching import Match, Wrapped
 from .properties import carried_kinds, fit_rig, groups, mix, move_object, onto
 
@@ -106,7 +106,7 @@ class ARAPFIELDS_OT_wrap(SolveOperator, bpy.types.Operator):
         def apply(solved):
             said, context, source = item.apply(solved), bpy.context, marks.source.get()
             marks.put()
-            visibility.show_landmarks(source, False)
+            placement.show_landmarks(source, False)
             if self.in_place(source):
                 wrapped.put()
             for one in below:
@@ -210,8 +210,10 @@ class ARAPFIELDS_OT_transfer(JobOperator, bpy.types.Operator):
     def plan(self, context, source, weights):
         target = landmarks.target_of(source, self.onto)
         kinds = effective_value("transfer", settings_of(source).wrap, self)
-        has_keys = "KEYS" in kinds and bool(keys.of(source))
-        refuse(transfer.refusal(source, target) or (keys.refusal(source, target) if has_keys else None))
+        has_keys = "KEYS" in kinds and bool(transfer.keys_of(source))
+        refuse(
+            transfer.refusal(source, target) or (transfer.key_refusal(source, target) if has_keys else None)
+        )
         layers.uncover(source)
         match = Match(context, source, target, has_keys)
         wrap = settings_of(source).wrap

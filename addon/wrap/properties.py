@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..blender.object_references import select_alone
 from ..blender.property_definitions import (
     annotations,
     choice,
@@ -14,7 +15,6 @@ from ..blender.property_definitions import (
     pointer,
     text,
 )
-from ..blender.selection import select_alone
 from ..core.settings.choices import TRANSFERRED
 from ..core.settings.parameters import WRAP
 

@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 from support.programs.batches import FakeLaunch, batch, make_folders, starts, statuses
 
-from addon.commands.batch import Record, described, differences, flags, plan, run_batch
-from addon.commands.children import Children, understand
+from addon.commands.batch import Children, Record, described, differences, flags, plan, run_batch, understand
 from addon.commands.parser import parse, solve_settings
 from addon.core.errors import UserError
 
@@ -234,7 +233,7 @@ def test_children_end_with_a_parent_that_is_killed(tmp_path):
     """Two at once: each holds a lock for as long as it lives."""
     child = (
         f"import sys, time; sys.path.insert(0, {str(ROOT)!r})\n"
-        "from addon.commands.children import end_with_parent\n"
+        "from addon.commands.batch import end_with_parent\n"
         "from addon.commands.batch import Record\n"
         "end_with_parent(); record = Record(sys.argv[1])\n"
         "while not record.claim(sys.argv[2]): time.sleep(0.01)\n"
@@ -242,7 +241,7 @@ def test_children_end_with_a_parent_that_is_killed(tmp_path):
     )
     parent = (
         f"import os, sys, threading; sys.path.insert(0, {str(ROOT)!r})\n"
-        "from addon.commands.children import Children\n"
+        "from addon.commands.batch import Children\n"
         "with Children(dict(os.environ), None) as children:\n"
         f"    command = [sys.executable, '-c', {child!r}, sys.argv[1]]\n"
         "    for name in ('a', 'b'):\n"

@@ -16,13 +16,11 @@ ORDER = [
     "jobs",
     "tasks",
     "field_modifier",
-    "field_nodes",
     "handles",
     "carried",
     "stiffness",
     "surface",
     "results",
-    "viewport",
     "solver",
     "contact",
     "live",
@@ -73,11 +71,11 @@ ENDED_ELSEWHERE = {  # state that the lifecycle's STATE does not list, and why
     "lifecycle._begun": "lifecycle.unregister itself",
     "lifecycle._drawn": "lifecycle.unregister itself",
     "host._started": "timers.clear, by STATE, which lists the module",
-    "selection.rows": "a flag that is down whenever no row is being chosen",
+    "object_references.rows": "a flag that is down whenever no row is being chosen",
     "native._state": "the library, which a process loads once",
-    "undo_steps.is_between": "set within a context manager alone",
-    "undo_steps.keeps_unused": "set within a context manager alone",
-    "undo_steps.pushed": "a count of steps that only rises",
+    "references.is_between": "set within a context manager alone",
+    "references.keeps_unused": "set within a context manager alone",
+    "references.pushed": "a count of steps that only rises",
     "property_definitions.listeners": "filled while modules are imported, constant afterwards",
 }
 
@@ -134,7 +132,6 @@ def test_nothing_but_the_contents_page_needs_operators_or_panels():
 
 def test_properties_import_only_choices_and_tables():
     allowed = ("core.settings", "names", "blender.property_definitions", "blender.object_references")
-    allowed += ("blender.selection",)
     sources = [path for path in modules() if path.stem == "properties" or path.parent.name == "properties"]
     wrong = [
         f"{name(path)} imports {one}"
@@ -225,7 +222,7 @@ def test_state_is_in_objects_that_the_lifecycle_lists():
     listed = {ast.unparse(entry) for value in tuples for entry in value.elts}
     listed |= {direct.get(one, one) for one in listed}
     state = {one for path in modules() for one in state_of(path)}
-    assert {"style_object.cache", "property_definitions.listeners", "native._state"} <= state
+    assert {"style_settings.style_cache", "property_definitions.listeners", "native._state"} <= state
     unlisted = state - listed
     assert unlisted == set(ENDED_ELSEWHERE), unlisted ^ set(ENDED_ELSEWHERE)
 

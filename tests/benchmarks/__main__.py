@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""make bench: every benchmark module's run(), as one table on the screen and in build/bench.json.
+"""make bench: every section of the benchmarks, as one table on the screen and in build/bench.json.
 
-python -m tests.benchmarks [module ...]; `peers` needs PEERS, a folder with their code.
+python -m tests.benchmarks [section ...]; `peers` needs PEERS, a folder with their code.
 
 Without the published networks (ARAPFIELDS_DATA) it runs on shapes of our own. A section that cannot run is
 left out and says why; what it found at an earlier run stays in the file.
@@ -10,7 +10,6 @@ left out and says why; what it found at an earlier run stays in the file.
 import importlib
 import json
 import os
-import pkgutil
 import platform
 import sys
 import traceback
@@ -22,9 +21,20 @@ import arapfields as af
 
 from . import shapes
 
-FOLDER = Path(__file__).parent
 TARGET = shapes.ROOT / "build" / "bench.json"
-HELPERS = {"__main__", "timing", "render", "shapes", "peer"}
+SECTIONS = {  # section: its module, where run_<section>() measures it
+    section: module
+    for module, sections in {
+        "stages": ("distance", "sampling", "extraction", "fit", "jets"),
+        "solves": ("deform", "stylize", "contact", "skin"),
+        "live": ("live", "live_compare"),
+        "conditions": ("backends", "busy", "sizes"),
+        "defaults": ("defaults",),
+        "exact": ("exact",),
+        "peers": ("peers",),
+    }.items()
+    for section in sections
+}
 
 
 def machine():
@@ -57,10 +67,15 @@ def keep(results):
     partial.replace(TARGET)
 
 
+def section_of(name):
+    module = importlib.import_module(f"tests.benchmarks.{SECTIONS[name]}")
+    return getattr(module, f"run_{name}")
+
+
 def run(name):
     """A section's rows, or the reason why it is left out, and whether that is an error."""
     try:
-        return importlib.import_module(f"tests.benchmarks.{name}").run(), None, False
+        return section_of(name)(), None, False
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] in ("tests", "arapfields"):
             raise
@@ -74,10 +89,9 @@ def run(name):
 
 def main(names):
     os.environ.setdefault("ARAPFIELDS_DATA", str(shapes.data()))
-    known = [module.name for module in pkgutil.iter_modules([str(FOLDER)]) if module.name not in HELPERS]
-    unknown = sorted(set(names) - set(known))
+    unknown = sorted(set(names) - set(SECTIONS))
     if unknown:
-        sys.exit(f"no benchmark {', '.join(unknown)}; there are {', '.join(known)}")
+        sys.exit(f"no benchmark {', '.join(unknown)}; there are {', '.join(SECTIONS)}")
     results = earlier()
     results["machine"] = machine()
     print("  ".join(f"{key} {value}" for key, value in results["machine"].items()), flush=True)
@@ -86,7 +100,7 @@ def main(names):
         where = f"no published networks of {', '.join(own)} in {shapes.data()}"
         print(f"{where}: shapes of our own instead", flush=True)
     left_out, broken = {}, False
-    for name in names or known:
+    for name in names or SECTIONS:
         rows, reason, ours = run(name)
         broken |= ours
         if reason:

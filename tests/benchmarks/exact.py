@@ -155,7 +155,7 @@ def row(what, draw, handles):
     return result
 
 
-def run(pairs=10):
+def run_exact(pairs=10):
     bunny = shapes.sdf("bunny")
 
     def of_bunny(count, seed):

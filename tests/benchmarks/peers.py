@@ -14,7 +14,7 @@ import numpy as np
 import arapfields as af
 
 from . import shapes
-from .peer import registration, styles, theirs, weights, yardstick
+from .peer import compared, theirs
 from .peer.theirs import Refused, awkward, of_figures
 
 # Of the processor, for each training of implicit-arap; 0 is its own settings. Its own 1,000 steps run to the
@@ -146,7 +146,7 @@ def constraint_rows(problem, checkout):
             "by": name,
             "vertices": len(problem.vertices),
             "cpu_s": round(seconds, 2),
-            **yardstick.measured(problem, moved),
+            **theirs.measured(problem, moved),
             **(fingers(problem, moved) if problem.shape == "hand" else {}),
             "said": told,
         }
@@ -168,7 +168,7 @@ def verdict(problem, call):
         return f"refused: {lines[-1][:90]}"
     if not np.isfinite(moved).all():
         return "not finite"
-    measured = yardstick.measured(problem, moved)
+    measured = theirs.measured(problem, moved)
     if measured["handle_error_percent"] > 2:
         return f"handles missed by {measured['handle_error_percent']:.0f} %"
     crack = widest_crack(problem.vertices, moved) / np.ptp(problem.vertices[:, 2])
@@ -207,9 +207,14 @@ def awkward_rows(checkout):
         yield row
 
 
-def run():
+def run_peers():
     arap, style = (theirs.folder() / name for name in theirs.CODES)
-    quick = [*styles.rows(style), *awkward_rows(style), *weights.rows(), *registration.rows()]
+    quick = [
+        *compared.style_rows(style),
+        *awkward_rows(style),
+        *compared.weight_rows(),
+        *compared.registration_rows(),
+    ]
     rows = [row for problem in of_figures().values() for row in constraint_rows(problem, arap)]
     rows += quick
     rows += [{"code": path.name, "commit": theirs.commit(path)} for path in (arap, style)]

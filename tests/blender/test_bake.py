@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.blender.inside import IN_BLENDER
-from support.files.full_disk import files_of_at_most
+from support.files.archives import files_of_at_most
 
 if IN_BLENDER:
     import bpy

@@ -16,7 +16,7 @@ if IN_BLENDER:
     from addon.blender import modifier_stack
     from addon.core.runtime import jobs
     from addon.live import sessions
-    from addon.solver import setup
+    from addon.solver import frame_solver
 
 pytestmark = pytest.mark.in_blender
 
@@ -281,7 +281,7 @@ def test_a_renamed_bone_stays_a_handle_and_live(way, with_groups):
 
 
 def test_a_renamed_bone_is_undone_and_redone_while_live():
-    setup.SAMPLES = 500
+    frame_solver.SAMPLES = 500
     bar, rig = rigged_bar()
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.arapfields.add_bones()

@@ -15,7 +15,7 @@ if IN_BLENDER:
 
     from addon.core.geometry.spaces import space_of
     from addon.core.runtime import jobs
-    from addon.live import sessions, touching
+    from addon.live import recovery, sessions
     from addon.pin_tool.tool import ARAPFIELDS_TOOL_pin
     from addon.solver import contact
 
@@ -34,11 +34,11 @@ def test_a_live_shape_stays_outside_as_its_obstacle_comes_and_goes():
     bpy.context.view_layer.update()
     held = lowest(bar)
     assert held > low - 0.2 - 2e-3 * size > free, (free, held, low, size)
-    tinted = touching.places()
+    tinted = recovery.touching_points()
     assert len(tinted) > 3 and abs(tinted[:, 2] - low + 0.2).max() < 0.02 * size
     bar.arapfields.contact.use = False
     bpy.context.view_layer.update()
-    assert abs(lowest(bar) - free) < 1e-3 * size and not len(touching.places())
+    assert abs(lowest(bar) - free) < 1e-3 * size and not len(recovery.touching_points())
     bpy.ops.arapfields.live(kind="DEFORM")
     bar.arapfields.contact.use, bar.arapfields.contact.use_ground = True, False
     scenes.activate(block, bar)
@@ -270,13 +270,13 @@ def test_dots_come_back_with_what_undo_brings_back():
     bpy.context.view_layer.update()
     lowest(bar)
     bpy.ops.ed.undo_push(message="down")
-    pressing = touching.places()
+    pressing = recovery.touching_points()
     assert len(pressing) > 3
     for again, presses in zip("urururuurr", (0, 1, 0, 1, 0, 1, 0, None, 0, 1), strict=True):
         (bpy.ops.ed.undo if again == "u" else bpy.ops.ed.redo)()
         lowest(bpy.data.objects["Bar"])
         scenes.activate(bpy.data.objects["Bar"])
-        found = touching.places()
+        found = recovery.touching_points()
         assert bool(len(found)) == bool(presses), (again, presses, len(found))
         if presses:
             nearest = np.linalg.norm(found[:, None] - pressing, axis=2).min(axis=1)

@@ -23,11 +23,11 @@ if IN_BLENDER:
     from addon.core.geometry.spaces import space_of, unflattened
     from addon.core.runtime import jobs, threads
     from addon.deform import solve_job
-    from addon.deform.first_result import FirstResult, steps
+    from addon.deform.solve_job import FirstResult, steps
     from addon.field_modifier import motion
     from addon.live import sessions
     from addon.names import OFFSETS
-    from addon.solver import setup
+    from addon.solver import frame_solver
     from addon.surface.source_surface import PointsBefore, read_surface
 
 pytestmark = pytest.mark.in_blender
@@ -371,12 +371,12 @@ def posed(path, last):
 
 def live_points(bar, samples):
     """What live mode shows with so many samples."""
-    few, setup.SAMPLES = setup.SAMPLES, samples
+    few, frame_solver.SAMPLES = frame_solver.SAMPLES, samples
     try:
         sessions.begin(bpy.context, bar)
         step(refined=True)
     finally:
-        setup.SAMPLES = few
+        frame_solver.SAMPLES = few
     points = local_points(bar)
     sessions.end(bpy.context, bar)
     scenes.activate(bar)
@@ -460,7 +460,7 @@ def scaled(item, scales):
 
 def bar_of_five_frames():
     """A bar whose right end rises from frame 1 to frame 5, and whose handles go along with it."""
-    setup.SAMPLES = 500
+    frame_solver.SAMPLES = 500
     bar = animated()
     for entry in bar.arapfields.handles:
         entry.empty.parent = bar

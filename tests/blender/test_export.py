@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from pxr import UsdGeom
 from support.blender.inside import IN_BLENDER
-from support.files.full_disk import files_of_at_most
+from support.files.archives import files_of_at_most
 
 if IN_BLENDER:
     import bpy

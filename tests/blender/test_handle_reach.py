@@ -19,11 +19,11 @@ if IN_BLENDER:
 
     from addon.blender.object_references import settings_of
     from addon.core.runtime import jobs
-    from addon.handles import subdivided, symmetry
+    from addon.handles import native_handles, symmetry
+    from addon.handles.overlays import CIRCLE_ENDS, box_lines, ghosts, segments
     from addon.live import sessions
     from addon.pin_tool import drag, drawing
     from addon.pin_tool.operators import reach_steps
-    from addon.viewport.handle_boxes import CIRCLE_ENDS, box_lines, ghosts, segments
 
 pytestmark = pytest.mark.in_blender
 
@@ -294,8 +294,8 @@ def test_a_box_beside_what_is_seen_still_holds_nothing():
 
 def test_large_cages_are_subdivided_less():
     cube, *_ = subdivided_cube(levels=6)
-    places, seen = subdivided.read(bpy.context, cube, True, [])
-    assert len(places) == len(seen) < subdivided.MOST
+    places, seen = native_handles.read_subdivided(bpy.context, cube, True, [])
+    assert len(places) == len(seen) < native_handles.MOST
     assert np.abs(np.abs(places).max(axis=1) - 1.0).max() < 1e-6  # on the cage
     assert np.abs(seen - places).max() > 0.1 and len(bpy.data.scenes) == 1
     assert cube.modifiers["Subdivision"].levels == 6

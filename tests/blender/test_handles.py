@@ -19,7 +19,7 @@ if IN_BLENDER:
     from addon.blender.object_references import owner_of, source_of
     from addon.core.geometry.spaces import rigid_motion, space_of
     from addon.handles import empties
-    from addon.handles.naming import name_for
+    from addon.handles.empties import name_for
     from addon.live import sessions
     from addon.pin_tool.pins import handles_in_view
 

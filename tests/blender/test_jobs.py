@@ -33,9 +33,9 @@ if IN_BLENDER:
     from addon.deform.operators import ARAPFIELDS_OT_deform
     from addon.field_modifier import inputs
     from addon.handles import empties, operators
-    from addon.jobs import display, modal, status_bar
+    from addon.jobs import display, job_operator
     from addon.jobs import operators as job_operators
-    from addon.jobs.modal import ModalRun
+    from addon.jobs.job_operator import ModalRun
     from addon.results import placement
     from addon.wrap.operators import ARAPFIELDS_OT_wrap
 
@@ -71,20 +71,20 @@ class Window:
 
     def status_text_set(self, text):
         said = []
-        status_bar.draw(SimpleNamespace(layout=Layout(said)), self)
+        display.draw(SimpleNamespace(layout=Layout(said)), self)
         self.texts.append(" ".join([*said, *([text] if text else [])]))
 
 
 @contextlib.contextmanager
 def window():
     """A Window that the add-on takes for Blender's own."""
-    kept = display.bpy, host.bpy, modal.has_window
+    kept = display.bpy, host.bpy, job_operator.has_window
     stand_in = Window(host.bpy.app)
-    display.bpy, host.bpy, modal.has_window = stand_in, stand_in, lambda: True
+    display.bpy, host.bpy, job_operator.has_window = stand_in, stand_in, lambda: True
     try:
         yield stand_in
     finally:
-        display.bpy, host.bpy, modal.has_window = kept
+        display.bpy, host.bpy, job_operator.has_window = kept
 
 
 def operator(work):

@@ -18,7 +18,7 @@ if IN_BLENDER:
     from addon.field_modifier import cache_modifier, layers, motion
     from addon.live import sessions
     from addon.pin_tool import drag
-    from addon.solver import setup
+    from addon.solver import frame_solver
 
 pytestmark = pytest.mark.in_blender
 
@@ -72,7 +72,7 @@ def test_a_refused_run_leaves_a_layer_that_was_there_before(run, given):
 
 
 def test_a_drag_over_a_style_is_cancelled_undone_and_deleted_bit_for_bit():
-    setup.SAMPLES = 500
+    frame_solver.SAMPLES = 500
     styled()
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="styled")
@@ -114,7 +114,7 @@ def test_a_drag_over_a_style_is_cancelled_undone_and_deleted_bit_for_bit():
 
 @pytest.mark.parametrize("live_style", [False, True])
 def test_live_over_a_style_ends_with_it(live_style):
-    setup.SAMPLES = 500
+    frame_solver.SAMPLES = 500
     bar, shape, _ = styled()
     moving = with_handles(bar)
     if live_style:

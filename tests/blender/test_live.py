@@ -21,7 +21,7 @@ if IN_BLENDER:
     from support.blender.stacks import add_modifier, build, local_points
     from support.blender.stages import watched
 
-    from addon.blender import mesh_arrays, modifier_stack, undo_steps
+    from addon.blender import mesh_arrays, modifier_stack, references
     from addon.core.geometry import spaces
     from addon.core.runtime import jobs
     from addon.core.runtime.jobs import run_to_completion
@@ -341,12 +341,12 @@ def test_a_refused_press_of_another_kind_leaves_live_mode(result, fails):
     shown = {
         item.name: scenes.world_points(item) for item in bpy.context.scene.objects if item.type == "MESH"
     }
-    pushed = undo_steps.pushed
+    pushed = references.pushed
     with pytest.raises(RuntimeError, match="no handle" if fails == "at once" else "No part of the surface"):
         bpy.ops.arapfields.live(kind="DEFORM")
     step(refined=True)
     assert sessions.is_live(bar, "STYLIZE") and bar.arapfields.live_kind == "STYLIZE"
-    assert undo_steps.pushed == pushed
+    assert references.pushed == pushed
     now = shown_meshes()
     assert now.keys() == shown.keys() and len(now) == (1 if result == "MODIFIER" else 2)
     for name, points in shown.items():

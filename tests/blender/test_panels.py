@@ -14,7 +14,7 @@ from support.blender.inside import IN_BLENDER
 
 if IN_BLENDER:
     import bpy
-    from support.blender import scenes, strings
+    from support.blender import panels, scenes
     from support.blender.panels import Layout, drawn, each_task, prepared
 
     import addon.registration as registration
@@ -24,7 +24,7 @@ if IN_BLENDER:
     from addon.core.errors import UserError
     from addon.core.runtime import jobs
     from addon.handles import empties
-    from addon.jobs import status_bar
+    from addon.jobs import display
     from addon.live import sessions
     from addon.names import Op
 
@@ -275,7 +275,7 @@ def test_a_fit_tells_its_errors():
 def test_the_status_bar_shows_the_job_and_its_cancel():
     def texts():
         labels = []
-        status_bar.draw(type("Header", (), {"layout": Layout(labels)})(), bpy.context)
+        display.draw(type("Header", (), {"layout": Layout(labels)})(), bpy.context)
         return labels
 
     assert texts() == []
@@ -285,7 +285,7 @@ def test_the_status_bar_shows_the_job_and_its_cancel():
     finally:
         undo()
     assert texts() == []
-    assert status_bar.draw in bpy.types.STATUSBAR_HT_header.draw._draw_funcs
+    assert display.draw in bpy.types.STATUSBAR_HT_header.draw._draw_funcs
 
 
 @pytest.mark.parametrize("field", ["auto", "radial", "neural"])
@@ -471,7 +471,7 @@ def test_the_first_start_says_where_the_extension_is_and_only_the_first():
 
 
 def test_every_text_is_translated():
-    texts = strings.every()
+    texts = panels.every()
     assert len(texts) > 250
 
     def fields(text):
@@ -482,7 +482,7 @@ def test_every_text_is_translated():
     for language, table in tables.items():
         missing = [text for text in texts if ("*", text) not in table]
         assert not missing, (language, missing)
-        stale = {text for _, text in table} - set(texts) - strings.UNTRANSLATED
+        stale = {text for _, text in table} - set(texts) - panels.UNTRANSLATED
         assert not stale, (language, stale)
         for (_, text), translated in table.items():
             assert translated and fields(text) == fields(translated), text

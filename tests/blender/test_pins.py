@@ -15,16 +15,15 @@ if IN_BLENDER:
     from support.blender import scenes
     from support.blender.live import WAIT, from_above, pin, state, step
 
-    from addon.core.geometry.rotations import best_rotation
-    from addon.core.geometry.spaces import transform
+    from addon.core.geometry.spaces import best_rotation, transform
     from addon.core.runtime import jobs
     from addon.field_modifier import motion
     from addon.handles import empties, left_behind
-    from addon.handles.naming import PALETTE, free_colour
+    from addon.handles.empties import PALETTE, free_colour
     from addon.live import sessions
-    from addon.live.prefetch import prefetch
+    from addon.live.live_solver import prefetch
     from addon.pin_tool import drag, hints, hover, pins, places, screen
-    from addon.solver import setup
+    from addon.solver import frame_solver
 
 pytestmark = pytest.mark.in_blender
 
@@ -525,7 +524,7 @@ ROUNDS = 2
 
 
 def test_rounds_of_undo_and_redo_are_exact():
-    setup.SAMPLES = 500
+    frame_solver.SAMPLES = 500
     scenes.bar()
     bpy.context.preferences.edit.use_global_undo = True
     states = []

@@ -22,7 +22,7 @@ if IN_BLENDER:
     from addon.blender.property_definitions import effective_values
     from addon.core.settings.choices import STYLES, STYLIZE
     from addon.core.settings.parameters import DEFORM, FIT, TABLE
-    from addon.solver import setup
+    from addon.solver import frame_solver
 
 pytestmark = pytest.mark.in_blender
 
@@ -81,7 +81,7 @@ SETTINGS = {  # {what: (kind of shape, group of settings, property, values at th
 
 def bent_bar():
     """A bar whose right end is lifted below a box that is in the way."""
-    setup.SAMPLES = 500
+    frame_solver.SAMPLES = 500
     bar, _, moving = scenes.bar_with_handles()
     bpy.ops.mesh.primitive_cube_add(size=0.5, location=(1.0, 0.0, 1.15))
     scenes.activate(bpy.context.object, bar)
@@ -93,7 +93,7 @@ def bent_bar():
 
 
 def ball():
-    setup.SAMPLES = 500
+    frame_solver.SAMPLES = 500
     bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8)
     return bpy.context.object
 

@@ -16,7 +16,7 @@ if IN_BLENDER:
     from support.blender.live import pin, step
     from support.blender.scans import file_values, given, places, scan, shown, vector_values
     from support.files import splats
-    from support.files.full_disk import files_of_at_most
+    from support.files.archives import files_of_at_most
 
     import arapfields as af
     from addon.core.geometry.spaces import transform

@@ -20,7 +20,7 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.core.settings.choices import STYLES, style_identifier, style_name
     from addon.live import sessions
-    from addon.solver import setup, style_object
+    from addon.solver import frame_solver, style_settings
     from addon.stylize import ball as picture
 
 pytestmark = pytest.mark.in_blender
@@ -181,7 +181,7 @@ SINGLE = 1e-6  # single precision, of a ball of radius 1
 
 
 def test_a_style_follows_its_sliders_without_handles():
-    setup.SAMPLES = FEW
+    frame_solver.SAMPLES = FEW
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
     ball = bpy.context.object
     assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
@@ -229,7 +229,7 @@ def test_the_implicit_surface_follows_too():
 
 
 def test_a_live_style_follows_stiffness_rigidity_and_the_fold_barrier():
-    setup.SAMPLES = FEW
+    frame_solver.SAMPLES = FEW
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
     ball = bpy.context.object
     style = ball.arapfields.stylize
@@ -256,7 +256,7 @@ def test_a_live_style_follows_stiffness_rigidity_and_the_fold_barrier():
 
 def test_live_waits_while_the_object_of_a_style_is_still_to_be_chosen():
     """What was shown stays until it is, and then follows it."""
-    setup.SAMPLES = FEW
+    frame_solver.SAMPLES = FEW
     bpy.ops.mesh.primitive_cube_add(size=1, location=(5, 0, 0), rotation=(0.5, 0.3, 0))
     cube = bpy.context.object
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
@@ -342,9 +342,9 @@ def test_faces_of_a_mesh_opens_as_object():
 
 def test_the_picture_of_a_style_object_is_a_ball():
     bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8)
-    of_ball = picture.picture(style_object.style_of(bpy.context.object)[0])
+    of_ball = picture.picture(style_settings.style_of(bpy.context.object)[0])
     bpy.ops.mesh.primitive_cube_add()
-    of_box = picture.picture(style_object.style_of(bpy.context.object)[0])
+    of_box = picture.picture(style_settings.style_of(bpy.context.object)[0])
     middle = slice(picture.SIZE // 4, -picture.SIZE // 4)
     shades = [len(np.unique(np.round(p[middle, middle, 0], 2))) for p in (of_ball, of_box)]
     assert shades[0] > 30 and np.array_equal(of_ball[..., 3], of_box[..., 3])

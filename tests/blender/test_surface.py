@@ -22,7 +22,7 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.field_modifier import motion
     from addon.live import sessions
-    from addon.surface import surface_fit
+    from addon.surface import source_surface
     from addon.surface.source_surface import read_surface
 
 pytestmark = pytest.mark.in_blender
@@ -41,18 +41,18 @@ def test_a_fit_is_cached_and_goes_stale_with_the_mesh():
     ours = bar.arapfields
     assert fit_cache().path(ours.fit_key).exists() and fit_cache().size() > 0
     assert json.loads(ours.fit_report)["near_mean"] < 0.05
-    assert read_surface(bpy.context, bar).fit.is_cached and surface_fit.reason(bar) == ""
+    assert read_surface(bpy.context, bar).fit.is_cached and source_surface.outdated(bar) == ""
     bar.arapfields.fit.iterations += 1
-    assert surface_fit.reason(bar) == "The settings changed since the fit"
+    assert source_surface.outdated(bar) == "The settings changed since the fit"
     bar.arapfields.fit.iterations -= 1
     bar.location.x += 3  # where it is does not matter
     assert read_surface(bpy.context, bar).fit.key == ours.fit_key
     bpy.context.view_layer.update()
-    assert surface_fit.reason(bar) == ""
+    assert source_surface.outdated(bar) == ""
     bar.data.vertices[0].co.x += 0.1
     bar.data.update()
     bpy.context.view_layer.update()
-    assert surface_fit.reason(bar) == "The mesh changed since the fit"
+    assert source_surface.outdated(bar) == "The mesh changed since the fit"
     assert not read_surface(bpy.context, bar).fit.is_cached
     bpy.ops.arapfields.clear_cache()
     assert fit_cache().size() == 0

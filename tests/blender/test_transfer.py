@@ -23,7 +23,7 @@ if IN_BLENDER:
     from addon.carried import rest_bones
     from addon.core.runtime import jobs
     from addon.field_modifier import inputs, motion
-    from addon.wrap import keys
+    from addon.wrap import transfer
     from addon.wrap.matching import Wrapped
     from addon.wrap.operators import ARAPFIELDS_OT_transfer
 
@@ -168,8 +168,8 @@ def test_what_cannot_take_anything_is_named_and_kept():
 def test_drivers_and_what_is_carried_go_to_the_target():
     item, target, rest = wrapped_bar()
     (rig,) = (m.object for m in item.modifiers if m.type == "ARMATURE")
-    keys = item.data.shape_keys
-    driver = keys.key_blocks["Belly"].driver_add("value").driver
+    transfer = item.data.shape_keys
+    driver = transfer.key_blocks["Belly"].driver_add("value").driver
     driver.expression = "0 * var"
     driver.variables.new().targets[0].id = rig
     shell = bpy.data.meshes.new("Shell")
@@ -439,10 +439,10 @@ def test_values_that_the_wrap_was_made_with_do_not_move_the_target():
     scenes.activate(item)
     assert bpy.ops.arapfields.transfer() == {"FINISHED"}
     bpy.context.view_layer.update()
-    keys = target.data.shape_keys.key_blocks
-    assert [key.name for key in keys] == ["Basis", "Fat", "Unseen", "Half", "Tip", "ARAP Neutral"]
-    assert [round(key.value, 5) for key in keys[1:]] == [0.6, 1.0, 0.5, -0.3, 1.0]
-    assert keys["Unseen"].mute and keys["Half"].relative_key == keys["Fat"]
+    transfer = target.data.shape_keys.key_blocks
+    assert [key.name for key in transfer] == ["Basis", "Fat", "Unseen", "Half", "Tip", "ARAP Neutral"]
+    assert [round(key.value, 5) for key in transfer[1:]] == [0.6, 1.0, 0.5, -0.3, 1.0]
+    assert transfer["Unseen"].mute and transfer["Half"].relative_key == transfer["Fat"]
     assert np.array_equal(mesh_arrays.positions(target.data), own)
     assert np.abs(scenes.world_points(target) - shown).max() < SINGLE
     offset = offsets(target, "Fat") @ np.array(target.matrix_world)[:3, :3].T
@@ -465,7 +465,7 @@ def test_values_that_the_wrap_was_made_with_do_not_move_the_target():
     ]
     masked = np.array([[sum(each)] for each in weights]) * offsets(target, "Tip")
     change = (0.3 * masked - 0.4 * offsets(target, "Fat")) @ np.array(target.matrix_world)[:3, :3].T
-    assert len(keys) == 6 and np.abs(masked).max() > 0.1
+    assert len(transfer) == 6 and np.abs(masked).max() > 0.1
     assert np.abs(scenes.world_points(target) - shown - change).max() < 2 * SINGLE
 
 
@@ -503,10 +503,10 @@ def test_keys_that_are_relative_to_each_other_in_a_circle_are_carried():
     assert bpy.ops.arapfields.wrap(**SMALL) == {"FINISHED"}
     scenes.activate(item)
     assert bpy.ops.arapfields.transfer() == {"FINISHED"}
-    keys = target.data.shape_keys.key_blocks
-    assert [key.relative_key.name for key in keys] == ["Basis", "Other", "One", "Own"]
-    for key in keys[1:]:
-        moved = mesh_arrays.vectors(key.data, "co") - mesh_arrays.vectors(keys[0].data, "co")
+    transfer = target.data.shape_keys.key_blocks
+    assert [key.relative_key.name for key in transfer] == ["Basis", "Other", "One", "Own"]
+    for key in transfer[1:]:
+        moved = mesh_arrays.vectors(key.data, "co") - mesh_arrays.vectors(transfer[0].data, "co")
         assert 0.1 < np.abs(moved).max() < 0.4
 
 
@@ -702,7 +702,7 @@ def lay(item, target):
     motion.bind(bpy.context, item)
     with modifier_stack.evaluated_mesh(bpy.context, item, in_place=True) as mesh:
         points = mesh_arrays.positions(mesh)
-    item.arapfields.wrap.shown_keys = json.dumps(keys.shown(item))
+    item.arapfields.wrap.shown_keys = json.dumps(transfer.shown_values(item))
     motion.write(item, motion.Motion(scenes.world_points(target) - points))
     scenes.activate(item)
 

@@ -14,8 +14,7 @@ if IN_BLENDER:
 
     from addon.live import live_solver, sessions
     from addon.pin_tool import drag
-    from tests.blender.walk import world
-    from tests.fuzz.walk import all_scene
+    from tests.fuzz.walk import walk_scenes
 
 pytestmark = pytest.mark.in_blender
 
@@ -38,11 +37,11 @@ def build():
     bpy.context.preferences.edit.use_global_undo = True
     bpy.context.preferences.edit.undo_steps = 64
     for number, kind in enumerate(("MIRROR", "SUBSURF", None)):
-        bar = all_scene.bar(np.random.default_rng(0), f"Bar{number}", (0, 3 * number, 0), handles=False)
+        bar = walk_scenes.bar(np.random.default_rng(0), f"Bar{number}", (0, 3 * number, 0), handles=False)
         if kind is not None:
             bar.modifiers.new(kind.title(), kind)
             bpy.context.view_layer.update()
-        all_scene.give_handles(bar)
+        walk_scenes.give_handles(bar)
     scenes.bar("Die").location.x = 5
     bpy.context.view_layer.update()
 
@@ -76,7 +75,7 @@ def take(what, bar):
 
 @pytest.mark.parametrize("walk", WALKS)
 def test_undo_meets_no_reference_to_what_is_gone(walk):
-    end = world.few_centers()
+    end = walk_scenes.few_centers()
     try:
         build()
         bpy.ops.ed.undo_push(message="begin")
@@ -86,31 +85,31 @@ def test_undo_meets_no_reference_to_what_is_gone(walk):
             else:
                 take(step[:-1], bpy.data.objects[f"Bar{step[-1]}"])
                 bpy.ops.ed.undo_push(message=step)  # what timers do comes after the step
-            assert not all_scene.dangling()
-            world.settle()
-            assert not all_scene.dangling()
+            assert not walk_scenes.dangling()
+            walk_scenes.settle()
+            assert not walk_scenes.dangling()
     finally:
         end()
 
 
 def test_live_mode_that_ended_by_an_error_comes_back_by_undo():
     """Its end is a step of undo by itself; the step before is live, though its handle is gone already."""
-    end = world.few_centers()
+    end = walk_scenes.few_centers()
     try:
         build()
         bar = bpy.data.objects["Bar2"]
         take("live", bar)
         bpy.ops.ed.undo_push(message="live")
-        world.settle()
+        walk_scenes.settle()
         shown = scenes.world_points(bar)
         for empty in [entry.empty for entry in bar.arapfields.handles]:
             bpy.data.objects.remove(empty)
         bpy.ops.ed.undo_push(message="deleted")
-        world.settle()
+        walk_scenes.settle()
         assert not sessions.live and not bar.arapfields.live_kind
         for _ in range(2):
             bpy.ops.ed.undo()
-            world.settle()
+            walk_scenes.settle()
         bar = bpy.data.objects["Bar2"]
         assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
     finally:
@@ -118,21 +117,21 @@ def test_live_mode_that_ended_by_an_error_comes_back_by_undo():
 
 
 def test_a_live_object_of_its_own_comes_back_by_undo():
-    end = world.few_centers()
+    end = walk_scenes.few_centers()
     try:
         build()
         bar = bpy.data.objects["Bar2"]
         take("new", bar)
         take("live", bar)
         bpy.ops.ed.undo_push(message="live")
-        world.settle()
+        walk_scenes.settle()
         shown = scenes.world_points(bpy.data.objects["Bar2_live"])
         scenes.activate(bar)
         assert bpy.ops.arapfields.live() == {"FINISHED"}
         bpy.ops.ed.undo_push(message="off")
         assert "Bar2_live" not in bpy.data.objects and not bar.hide_render
         bpy.ops.ed.undo()
-        world.settle()
+        walk_scenes.settle()
         bar = bpy.data.objects["Bar2"]
         assert sessions.is_live(bar) and bar.hide_render
         assert np.array_equal(scenes.world_points(bpy.data.objects["Bar2_live"]), shown)
@@ -142,48 +141,48 @@ def test_a_live_object_of_its_own_comes_back_by_undo():
 
 def test_a_live_object_behind_its_extracted_surface_stays_hidden_under_undo():
     """Live mode begins anew with each change of what is carried, and hides and shows nothing then."""
-    end = world.few_centers()
+    end = walk_scenes.few_centers()
     try:
         build()
         bar = bpy.data.objects["Bar2"]
         bar.arapfields.resolution = 12
         take("live", bar)
         bpy.ops.ed.undo_push(message="live")
-        world.settle()
+        walk_scenes.settle()
         scenes.activate(bar)
         assert bpy.ops.arapfields.extract() == {"FINISHED"}
         bpy.ops.ed.undo_push(message="extract")
-        world.settle()
+        walk_scenes.settle()
         scenes.activate(bpy.data.objects["Bar2_implicit"], bar)
         assert bpy.ops.arapfields.carry() == {"FINISHED"}
         bpy.ops.ed.undo_push(message="carry")
-        world.settle()
+        walk_scenes.settle()
         assert bar.hide_get() and not bpy.data.objects["Bar2_implicit"].hide_get()
         bpy.ops.ed.undo()
-        world.settle()
+        walk_scenes.settle()
         assert bpy.data.objects["Bar2"].hide_get() and not bpy.data.objects["Bar2_implicit"].hide_get()
     finally:
         end()
 
 
 def test_a_shape_held_by_an_anchor_is_in_the_step_of_the_press():
-    end = world.few_centers()
+    end = walk_scenes.few_centers()
     try:
-        world.build()
+        walk_scenes.build_shapes()
         ball = bpy.data.objects["Ball"]
         scenes.activate(ball)
         assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
-        world.settle()
+        walk_scenes.settle()
         ball.arapfields.stylize.use_handles = True
-        world.settle()
+        walk_scenes.settle()
         shown = scenes.world_points(ball)
         pin(ball, shown[0], 0.3, anchor=True)
         bpy.ops.ed.undo_push(message="anchor")
         assert ball.arapfields.held  # before any timer
-        world.settle()
+        walk_scenes.settle()
         bpy.ops.ed.undo_push(message="another step")
         bpy.ops.ed.undo()
-        world.settle()
+        walk_scenes.settle()
         assert np.array_equal(scenes.world_points(bpy.data.objects["Ball"]), shown)
     finally:
         end()
@@ -191,7 +190,7 @@ def test_a_shape_held_by_an_anchor_is_in_the_step_of_the_press():
 
 def test_live_mode_that_is_refused_leaves_what_the_file_says():
     """Also where the user has removed the modifier whose motion had a name."""
-    end = world.few_centers()
+    end = walk_scenes.few_centers()
     try:
         build()
         bar = bpy.data.objects["Bar2"]
@@ -208,21 +207,21 @@ def test_live_mode_that_is_refused_leaves_what_the_file_says():
 
 def test_a_shape_comes_back_by_undo_after_its_helper_was_emptied():
     """Without the modifier the offsets lie on the mesh, and the helper's own are gone, which no step has."""
-    end = world.few_centers()
+    end = walk_scenes.few_centers()
     try:
         build()
         bar = bpy.data.objects["Bar0"]
         bar.modifiers["Mirror"].show_viewport = False
         take("live", bar)
-        world.settle()
+        walk_scenes.settle()
         bpy.ops.ed.undo_push(message="live")
-        world.settle()
+        walk_scenes.settle()
         shown = scenes.world_points(bar)
         bar.modifiers.remove(bar.modifiers["Mirror"])
         bpy.ops.ed.undo_push(message="removed")
-        world.settle()
+        walk_scenes.settle()
         bpy.ops.ed.undo()
-        world.settle()
+        walk_scenes.settle()
         bar = bpy.data.objects["Bar0"]
         assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
     finally:
@@ -240,7 +239,7 @@ def few_centers(test):
 
     @functools.wraps(test)
     def wrapped(*given, **named):
-        end = world.few_centers()
+        end = walk_scenes.few_centers()
         try:
             test(*given, **named)
         finally:
@@ -281,8 +280,8 @@ def test_an_import_with_its_rotation_comes_back_as_stored():
         push(message)
     bpy.ops.ed.undo()
     bpy.ops.ed.undo()
-    world.settle()
-    assert world.difference(scenes.world_points(bpy.data.objects["Bar"]), stored) < OFF
+    walk_scenes.settle()
+    assert walk_scenes.difference(scenes.world_points(bpy.data.objects["Bar"]), stored) < OFF
 
 
 @few_centers
@@ -295,13 +294,13 @@ def test_a_pin_moved_by_g_and_its_undo_take_the_mesh_along():
     for height in (0.6, 0.8, 1.0):
         bpy.data.objects[name].location.z = height
         push("G")  # before the timer has come round
-        world.settle()
+        walk_scenes.settle()
     for again, height in ((bpy.ops.ed.undo, 0.8), (bpy.ops.ed.undo, 0.6), (bpy.ops.ed.redo, 0.8)):
         again()
-        world.settle()
+        walk_scenes.settle()
         bar = bpy.data.objects["Bar"]
         assert abs(bpy.data.objects[name].location.z - height) < 1e-6
-        assert world.difference(world.shape(bar), world.fresh_shape(bar, "DEFORM")) < OFF
+        assert walk_scenes.difference(walk_scenes.shape(bar), walk_scenes.fresh_shape(bar, "DEFORM")) < OFF
 
 
 @few_centers
@@ -312,17 +311,19 @@ def test_each_live_style_is_that_of_the_settings_and_strength_0_is_rest():
     points = np.array([vertex.co for vertex in shell.data.vertices])
     points[:, 2] = 0.4 * np.cos(2 * points[:, 0])
     scenes.set_positions(shell.data, points)
-    rest = world.shape(shell)
+    rest = walk_scenes.shape(shell)
     bpy.ops.arapfields.live(kind="STYLIZE")
     bpy.ops.mesh.primitive_cube_add(size=1, location=(5, 0, 0), rotation=(0.5, 0.3, 0))
     style.style, style.style_object = "OBJECT", bpy.context.object
     for name in ("OBJECT", "ICOSAHEDRON", "CYLINDER"):
         style.style = name
         step(refined=True)
-        assert world.difference(world.shape(shell), world.fresh_shape(shell, "STYLIZE")) < OFF, name
+        assert (
+            walk_scenes.difference(walk_scenes.shape(shell), walk_scenes.fresh_shape(shell, "STYLIZE")) < OFF
+        ), name
     style.strength = 0.0
     step(refined=True)
-    assert sessions.is_live(shell) and np.abs(world.shape(shell) - rest).max() < NO_MOTION
+    assert sessions.is_live(shell) and np.abs(walk_scenes.shape(shell) - rest).max() < NO_MOTION
 
 
 @few_centers
@@ -347,20 +348,20 @@ def test_presses_and_cancelled_drags_of_a_live_style():
     entry = pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.4)).name
     entry = next(one for one in bar.arapfields.handles if one.empty.name == entry)
     bpy.ops.arapfields.live(kind="STYLIZE")
-    world.settle()
+    walk_scenes.settle()
     styled = scenes.world_points(bar)
     dragged = drag.of_entry(bpy.context, bar, entry)
     dragged.move(bpy.context, (0.9, 0.1, 0.6))
     dragged.cancel(bpy.context)
-    world.settle()
+    walk_scenes.settle()
     assert sessions.is_live(bar, "STYLIZE") and np.array_equal(scenes.world_points(bar), styled)
     drag.of_entry(bpy.context, bar, entry).end(bpy.context)
-    world.settle()
+    walk_scenes.settle()
     assert np.array_equal(scenes.world_points(bar), styled)
     for kind in ("STYLIZE", "DEFORM"):
         bpy.ops.arapfields.live(kind=kind)
-        world.settle()
-        assert world.difference(world.shape(bar), world.fresh_shape(bar, kind)) < 1e-5
+        walk_scenes.settle()
+        assert walk_scenes.difference(walk_scenes.shape(bar), walk_scenes.fresh_shape(bar, kind)) < 1e-5
 
 
 @few_centers
@@ -376,12 +377,12 @@ def test_a_style_that_waits_for_what_is_to_be_chosen_comes_back(lacks):
     else:
         style.style = "OBJECT"
     push("waits")
-    stored = world.everything()
+    stored = walk_scenes.everything()
     bpy.ops.arapfields.live(kind="STYLIZE")
     push("off")
     bpy.ops.ed.undo()
-    world.settle()
-    assert sessions.is_live(bpy.data.objects["Bar"]) and world.everything() == stored
+    walk_scenes.settle()
+    assert sessions.is_live(bpy.data.objects["Bar"]) and walk_scenes.everything() == stored
 
 
 @few_centers
@@ -392,7 +393,7 @@ def test_a_press_where_a_style_waits_for_its_object_holds_what_is_shown(comes_ba
     bar = scenes.bar()
     pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.4))
     bpy.ops.arapfields.live(kind="STYLIZE")
-    world.settle()
+    walk_scenes.settle()
     shown = scenes.world_points(bar)
     bar.arapfields.stylize.style = "OBJECT"
     if comes_back:
@@ -400,11 +401,11 @@ def test_a_press_where_a_style_waits_for_its_object_holds_what_is_shown(comes_ba
         bpy.ops.arapfields.live(kind="STYLIZE")
         bpy.ops.ed.undo_push(message="ended")
         bpy.ops.ed.undo()
-        world.settle()
+        walk_scenes.settle()
         bar = bpy.data.objects["Bar"]
         assert np.array_equal(scenes.world_points(bar), shown)
     drag.of_entry(bpy.context, bar, bar.arapfields.handles[0]).end(bpy.context)
-    world.settle()
+    walk_scenes.settle()
     assert np.array_equal(scenes.world_points(bar), shown)
 
 
@@ -413,15 +414,15 @@ def test_a_step_comes_back_live_however_many_sessions_later():
     bar = scenes.bar()
     undo_begins()
     bpy.ops.arapfields.live(kind="STYLIZE")
-    world.settle()
+    walk_scenes.settle()
     push("live")
-    stored = world.everything()
+    stored = walk_scenes.everything()
     for _ in range(25):  # as undone and redone steps, and changed handles, begin them
         sessions.begin(bpy.context, bar, "STYLIZE")
     push("other")
     bpy.ops.ed.undo()
-    world.settle()
-    assert sessions.is_live(bpy.data.objects["Bar"]) and world.everything() == stored
+    walk_scenes.settle()
+    assert sessions.is_live(bpy.data.objects["Bar"]) and walk_scenes.everything() == stored
 
 
 @pytest.mark.parametrize("rests", [False, True])
@@ -441,5 +442,5 @@ def test_a_release_changes_nothing_that_is_seen(rests):
     shown = scenes.world_points(bar)
     dragged.end(bpy.context)
     bpy.context.view_layer.update()
-    assert world.difference(scenes.world_points(bar), shown) < OFF
-    assert world.difference(world.shape(bar), world.fresh_shape(bar, "DEFORM")) < 1e-5
+    assert walk_scenes.difference(scenes.world_points(bar), shown) < OFF
+    assert walk_scenes.difference(walk_scenes.shape(bar), walk_scenes.fresh_shape(bar, "DEFORM")) < 1e-5

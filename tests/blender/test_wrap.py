@@ -31,7 +31,7 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.field_modifier import inputs
     from addon.handles.empties import matrix_of
-    from addon.results import visibility
+    from addon.results import placement
     from addon.wrap import landmarks
     from addon.wrap.landmark_tools import ARAPFIELDS_OT_click_landmarks as Operator
     from arapfields.cli import wrapping
@@ -607,7 +607,7 @@ def test_landmarks_go_when_it_is_wrapped_and_come_again():
     (pair,) = item.arapfields.wrap.landmarks
     ends = pair.rest, pair.on_target
     for again in (
-        lambda: visibility.show_landmarks(item, True),
+        lambda: placement.show_landmarks(item, True),
         lambda: bpy.ops.arapfields.remove_result(kind="WRAP"),
     ):
         assert all(end.visible_get() for end in ends)

@@ -8,8 +8,7 @@ import numpy as np
 from support.files import archives, odd_meshes
 
 import arapfields as af
-from addon.commands.batch import Record, differences
-from addon.commands.children import read_objects
+from addon.commands.batch import Record, differences, read_objects
 from arapfields.__main__ import main
 from arapfields.cli import files
 from arapfields.cli.handles import build_handles, read_handles

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from support.blender.inside import require_bpy
 
-from .api import LEFT_OUT, public_callables
-from .calls import calls, make_things, splat_calls
+from .calls import LEFT_OUT, calls, make_things, public_callables, splat_calls
 from .run import refusals, run_target, unreached
 from .walk import run
 from .walk.run import Blender, report

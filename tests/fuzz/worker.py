@@ -73,7 +73,7 @@ def run_files(target, seed, first, count, say):
 
 def run_api(seed, first, count, say):
     import arapfields as af
-    from tests.fuzz import api
+    from tests.fuzz import calls
     from tests.fuzz.calls import make_things
 
     documented = (af.InvalidInput, OSError, af.Cancelled, af.Diverged, TypeError)
@@ -83,7 +83,7 @@ def run_api(seed, first, count, say):
         rng = np.random.default_rng([seed, 1, number])
         things = make_things() if number == first else things  # noqa: F821
         with only_errors(documented) as outcome, np.errstate(all="ignore"):
-            name, function, arguments = api.case(rng, things)
+            name, function, arguments = calls.case(rng, things)
             say(number)
             signal.setitimer(signal.ITIMER_REAL, PATIENCE)
             try:

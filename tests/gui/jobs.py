@@ -10,7 +10,7 @@ from stage import until, until_idle
 from support.blender import scenes
 
 from addon.core.runtime import jobs
-from addon.viewport import previews
+from addon.handles import overlays
 
 SIDEBAR = (1150, 700)  # a spot over it
 LONG = {**scenes.NEW, "iterations": 200000}
@@ -33,15 +33,15 @@ def checks(figures, folder):
     bpy.context.view_layer.update()
     before = stage.everything()
     bpy.ops.ed.undo_push(message="before")
-    shown, show = [], previews.Preview.show
-    previews.Preview.show = lambda *given: (shown.append(True), show(*given))[1]
+    shown, show = [], overlays.Preview.show
+    overlays.Preview.show = lambda *given: (shown.append(True), show(*given))[1]
     begin = time.perf_counter()
     figures["invoke"] = invoke(LONG)
     figures["click_s"] = round(time.perf_counter() - begin, 4)
     yield 6.0
     figures["running"] = jobs.running() is not None
     stage.picture(folder, "running-apart")
-    previews.Preview.show = show
+    overlays.Preview.show = show
     figures["previews"] = len(shown)
     begin = time.perf_counter()
     bpy.ops.arapfields.cancel()
@@ -89,7 +89,7 @@ def result(figures, folder):
     invoke(scenes.NEW)
     yield from until_idle(120)
     modal = stage.positions("Bar_deformed")
-    figures["preview_gone"] = previews.shown.mesh is None
+    figures["preview_gone"] = overlays.shown.mesh is None
     yield 0.5
     stage.picture(folder, "result")
     was_made = "Bar_deformed" in bpy.data.objects

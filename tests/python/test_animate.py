@@ -15,14 +15,12 @@ import zipfile
 import numpy as np
 import pytest
 import trimesh
-from support.files.archives import names
-from support.files.full_disk import files_of_at_most
+from support.files.archives import files_of_at_most, names
 from support.geometry.meshes import LEFT, RIGHT, sphere, turned
 from support.programs.cli import process, run
 
 import arapfields as af
-from arapfields._files import whole_file
-from arapfields._locks import lock
+from arapfields._files import lock, whole_file
 from arapfields._native import InvalidInput
 from arapfields.cli.animate import STEPS, TOLERANCE
 from arapfields.cli.files import read_mesh

@@ -28,11 +28,10 @@ import arapfields as af
 from arapfields.__main__ import main
 from arapfields._options import options_of
 from arapfields.cli import files
-from arapfields.cli.files import read_mesh, read_normals, write_mesh
+from arapfields.cli.files import read_mesh, read_normals, read_weights, write_mesh
 from arapfields.cli.handles import build_handles, read_handles, read_tracks
 from arapfields.cli.parser import parse
 from arapfields.cli.skinning import read_bones
-from arapfields.cli.sources import read_weights
 from arapfields.cli.wrapping import read_landmarks
 
 # The command line's verbs on small and on real meshes.

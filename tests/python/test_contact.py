@@ -227,10 +227,10 @@ def test_a_handle_yields_where_only_its_mirror_image_collides(kind):
     "name", ["spot on box 0", "bunny on edge 0", "bunny on sheet 0", "rockerArm on moving plate 0"]
 )
 def test_no_vertex_of_many_is_deep(name):
-    from benchmarks import contact, shapes
+    from benchmarks import shapes, solves
 
     (case,) = [case for case in contact_cases.family(str(shapes.data())) if case.name == name]
-    row, _ = contact.measure(case)
+    row, _ = solves.measure(case)
     assert row["deep"] < 0.1 and row["flipped"] == 0
 
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 from support import tolerances
 from support.geometry import cases, meshes
-from support.oracles.energies import jets_with_jacobians, random_rotations
+from support.oracles import jets_with_jacobians, random_rotations
 
 import arapfields as af
 from arapfields._native import testing

@@ -6,7 +6,7 @@ import pytest
 import torch
 from support import tolerances
 from support.geometry import cases
-from support.oracles.energies import (
+from support.oracles import (
     arap_terms,
     gauss_loss,
     gradient_of,

@@ -6,7 +6,7 @@ import pytest
 from support import tolerances
 from support.geometry import cases, meshes
 from support.geometry.meshes import LEFT, RIGHT, bar_samples, turned
-from support.oracles.network import Network
+from support.oracles import Network
 from support.tasks import cancelled_when
 
 import arapfields as af

@@ -18,8 +18,7 @@ import pytest
 import safetensors.numpy
 from support.blender.inside import require_bpy
 from support.files import archives
-from support.files.archives import random_motion, write_cache
-from support.files.full_disk import files_of_at_most
+from support.files.archives import files_of_at_most, random_motion, write_cache
 from support.geometry.cases import bar_handles, bar_samples
 from support.programs.cli import (
     HELD_AND_SHIFTED,

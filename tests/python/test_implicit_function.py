@@ -10,7 +10,7 @@ import pytest
 from support import tolerances
 from support.geometry import cases, meshes
 from support.geometry.meshes import check_closed, sphere
-from support.oracles.network import Network
+from support.oracles import Network
 from support.tolerances import FUNCTION_DIFFERENCES, SAME_VERTICES, SPHERE_EXTRACTION
 
 import arapfields as af

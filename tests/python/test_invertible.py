@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 from support.geometry import cases, meshes
-from support.oracles.network import jets_of
+from support.oracles import jets_of
 from support.tolerances import AUTOGRAD, FLOAT_FIELD_DIFFERENCES
 
 import arapfields as af

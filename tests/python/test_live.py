@@ -21,7 +21,7 @@ from support.geometry.meshes import (
     handle_box,
     turned,
 )
-from support.oracles.energies import random_rotations
+from support.oracles import random_rotations
 from support.tolerances import LIVE_DRIFT, LIVE_IDENTITY, LIVE_KEEPS_UP, LIVE_ROUNDING, LIVE_WAY_BACK, TRACKED
 
 import arapfields as af

@@ -14,7 +14,7 @@ import pytest
 from support import tolerances
 from support.geometry import cases
 from support.geometry.meshes import small_layers, sphere
-from support.oracles.network import Network
+from support.oracles import Network
 from support.tolerances import (
     AUTOGRAD,
     DIFFERENCES,

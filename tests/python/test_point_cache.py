@@ -12,8 +12,7 @@ from collections import namedtuple
 
 import numpy as np
 import pytest
-from support.files.archives import FRAMES, POINTS, names, random_motion, write_cache
-from support.files.full_disk import files_of_at_most
+from support.files.archives import FRAMES, POINTS, files_of_at_most, names, random_motion, write_cache
 
 import arapfields as af
 from arapfields import point_cache

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import scipy.spatial
 from support.geometry import cases, meshes
-from support.oracles.network import Network
+from support.oracles import Network
 from support.tolerances import ON_SURFACE
 
 import arapfields as af

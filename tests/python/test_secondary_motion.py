@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 from support.geometry.meshes import LEFT, RIGHT, bar_samples, handle_box, turned
-from support.oracles.energies import gradient_of
+from support.oracles import gradient_of
 from support.tolerances import FLOAT32_ENERGY, FLOAT64_GRADIENT
 
 import arapfields as af

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support.files import archives
 from support.files import splats as written_splats
-from support.files.full_disk import files_of_at_most
+from support.files.archives import files_of_at_most
 from support.files.splats import MESH, SIZE, splats
 from support.geometry import cases
 from support.programs.cli import run

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Threads of the library, of callers and of other processes."""
 
-import importlib.util
 import os
 import subprocess
 import sys
@@ -16,7 +15,7 @@ from support.geometry.meshes import torus
 from support.tolerances import BUSY_SLOWDOWN
 
 import arapfields as af
-from arapfields._locks import lock, unlock
+from arapfields._files import lock, unlock
 
 # The library's own threads: a number for each call, the same results for all; libtorch's are left alone.
 
@@ -247,17 +246,14 @@ def test_no_variable_of_the_environment_is_touched():
 
 # Beside as many busy processes as there are processors, a call takes little more than twice as long.
 
-BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "busy.py"
-
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["deform", "live"])
 @pytest.mark.parametrize("first", ["torch", "arapfields"])
 def test_other_processes_cost_only_their_share(name, first):
-    spec = importlib.util.spec_from_file_location("busy", BENCHMARK)
-    busy = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(busy)
-    *_, ratio = busy.slowdown(name, first)
+    from benchmarks import conditions
+
+    *_, ratio = conditions.slowdown(name, first)
     assert ratio <= BUSY_SLOWDOWN
 
 
@@ -360,7 +356,7 @@ def test_daemon_threads_in_numpys_copies_leave_the_exit_code():
 THREADS, ROUNDS = 8, 100
 LOCK_ALL = """
 import sys
-from arapfields._locks import lock
+from arapfields._files import lock
 file = open(sys.argv[1], "ab")
 for byte in range(int(sys.argv[2])):
     lock(file, byte, wait=False)

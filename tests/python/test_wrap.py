@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 from support.geometry import wrap_cases as cases
-from support.oracles.network import Network
+from support.oracles import Network
 
 import arapfields as af
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import UserError
-from .connected import connected
-from .rotations import best_rotation
-from .spaces import inverse, rigid_motion
+from .edges import connected
+from .spaces import best_rotation, inverse, rigid_motion
 
 # Handles for the solver: boxes and motions in solve space.
 

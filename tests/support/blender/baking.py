@@ -13,8 +13,7 @@ from support.blender.stacks import local_points
 from addon.animation import operators
 from addon.core.runtime import jobs
 from addon.core.runtime.jobs import Pause, run_to_completion
-from addon.solver.frame_solver import FrameSolver
-from addon.solver.setup import sampled
+from addon.solver.frame_solver import FrameSolver, sampled
 from addon.solver.source_reader import SourceReader
 
 EXACT = 1e-6  # single precision of positions of size one

@@ -6,7 +6,7 @@ import io
 import json
 from pathlib import Path
 
-from support.files.full_disk import files_of_at_most
+from support.files.archives import files_of_at_most
 
 
 def command(arguments, largest, answer):

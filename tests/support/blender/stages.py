@@ -14,7 +14,7 @@ from addon.core.runtime import jobs
 from addon.core.runtime.jobs import Pause, run_to_completion
 from addon.deform.operators import ARAPFIELDS_OT_deform
 from addon.live import sessions
-from addon.solver import setup
+from addon.solver import frame_solver
 
 LIFT = 0.4  # motion of the moving handle along the world's z
 ENDS_WORK = {"undone", "redone", "reloaded"}  # stop jobs and bakes, by before_undo and before_load
@@ -71,7 +71,7 @@ class Stage:
         self.name = name
 
     def begin(self):
-        setup.SAMPLES = 500
+        frame_solver.SAMPLES = 500
         bar, _, moving = scenes.bar_with_handles()
         for name, value in scenes.QUICK.items():
             setattr(bar.arapfields.deform, name, value)

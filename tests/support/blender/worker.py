@@ -29,9 +29,9 @@ def load(path):
 
 def run(order):
     import addon
-    from addon.solver import setup
+    from addon.solver import frame_solver
 
-    setup.SAMPLES = SAMPLES
+    frame_solver.SAMPLES = SAMPLES
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)  # keeps preferences and other add-ons
     addon.register()
     try:

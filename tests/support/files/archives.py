@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of fields and signed distances as dicts, independently of the library, and small point caches."""
+"""Files of fields and distances as dicts, independently of the library, point caches, and full disks."""
 
+import contextlib
 import json
 import struct
 from itertools import pairwise
@@ -10,6 +11,8 @@ import numpy as np
 
 import arapfields as af
 from arapfields.point_cache import PointCacheWriter
+
+# Files of fields and signed distances as dicts, independently of the library, and small point caches.
 
 DTYPES = {"F64": np.dtype("<f8"), "F32": np.dtype("<f4")}
 NAMES = {dtype: name for name, dtype in DTYPES.items()}
@@ -119,3 +122,22 @@ def write_cache(path, motion, **settings):
 
 def names(folder):
     return sorted(path.name for path in folder.iterdir())
+
+
+# Simulates a full disk by the system's limit on file sizes.
+
+
+@contextlib.contextmanager
+def files_of_at_most(size):
+    """Limits files of this process to `size` bytes; None: no limit."""
+    if size is None:
+        yield
+        return
+    import resource  # not on Windows
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)

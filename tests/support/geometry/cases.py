@@ -5,7 +5,7 @@ import functools
 
 import numpy as np
 from support.geometry.nudge import nudged
-from support.oracles.network import Network
+from support.oracles import Network
 
 import arapfields as af
 

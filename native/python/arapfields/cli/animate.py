@@ -18,11 +18,10 @@ from .._streams import say
 from ..point_cache import SUFFIXES as CACHES
 from ..point_cache import Layout, PointCacheWriter
 from . import files, splat_files, usd
-from .flags import contact_key, contact_of
+from .command_line import Outputs, with_progress
+from .flags import contact_key, contact_of, given_options, result_options
 from .frames import FrameStore
 from .handles import read_tracks
-from .options import given_options, result_options
-from .running import Outputs, with_progress
 
 # Solves the frames of the verb animate.
 

@@ -13,11 +13,10 @@ import numpy as np
 
 import arapfields as af
 
-from .._files import read_arrays, whole_file, write_arrays
-from .._locks import lock
+from .._files import lock, read_arrays, whole_file, write_arrays
 from .._native import InvalidInput
 from .._report_files import from_json, to_json
-from .options import result_options
+from .flags import result_options
 
 # Store of solved frames, a file each, so that an interrupted run can be continued.
 

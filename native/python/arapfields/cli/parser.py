@@ -15,17 +15,19 @@ from .flags import (
     MESH,
     SOURCE,
     SPLATS,
+    add_option_flag,
+    add_option_flags,
     contact_flags,
     extraction_flags,
     inverse_flag,
     report_flag,
     sdf_flag,
+    shard,
     solve_flags,
     style_flags,
     up_axis_flag,
 )
 from .handles import AddHandle, MoveHandle
-from .options import add_option_flag, add_option_flags, shard
 
 # The command line as JSON: its verbs, and their flags with types, ranges and defaults.
 

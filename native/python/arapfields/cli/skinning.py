@@ -10,10 +10,9 @@ import arapfields as af
 
 from .._files import existing_file, read_text, write_arrays
 from . import files, verbs
-from .flags import MESH, stiffness_flags
-from .options import add_option_flags, given_options
-from .running import Outputs, with_progress
-from .sources import read_weights
+from .command_line import Outputs, with_progress
+from .files import read_weights
+from .flags import MESH, add_option_flags, given_options, stiffness_flags
 
 NAME = "skin"
 SUMMARY = "weights of a mesh for the bones of an armature, and correctives"

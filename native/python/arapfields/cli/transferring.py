@@ -7,8 +7,8 @@ import arapfields as af
 
 from .._files import existing_file, json_text, read_arrays, write_arrays
 from . import files, verbs
+from .command_line import Outputs, with_progress
 from .flags import MESH
-from .running import Outputs, with_progress
 
 NAME = "transfer"
 SUMMARY = "carry shape keys and values of a mesh over to the one that it was wrapped onto"

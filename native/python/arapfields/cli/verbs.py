@@ -12,12 +12,11 @@ import arapfields as af
 from .. import grids
 from .._files import json_text
 from .._streams import say
-from . import files, sources, splat_files
-from .flags import contact_of
+from . import files, splat_files
+from .command_line import Outputs, with_progress
+from .files import Source, fitted, samples
+from .flags import contact_of, given, given_options
 from .handles import build_handles, held_by, read_handles, rotation, triple, turn_upright
-from .options import given, given_options
-from .running import Outputs, with_progress
-from .sources import Source, fitted, samples
 
 
 def fit(args):
@@ -123,9 +122,9 @@ def warp(args):
         if af.GaussianSplats.is_file(args.input):
             _warp_splats(args, outputs)
             return
-        output = outputs.check(args.output, sources.WARPED, "--output")
+        output = outputs.check(args.output, files.WARPED, "--output")
         field = files.read_field(args.field)
-        write = sources.warped(args.input)
+        write = files.warped(args.input)
         body = af.sample_mesh(*files.read_mesh(args.body)) if args.body else None
 
         def move(rest):

@@ -18,13 +18,21 @@ from .._native import sample_mesh
 from .._streams import say
 from ..point_cache import SUFFIXES as CACHES
 from ..point_cache import PointCacheWriter
-from . import files, sources, verbs
-from .flags import SOURCE, report_flag, sdf_flag, stiffness_flags
+from . import files, verbs
+from .command_line import Outputs, with_progress
+from .files import read_numbers
+from .flags import (
+    SOURCE,
+    add_option_flags,
+    given,
+    given_options,
+    report_flag,
+    sdf_flag,
+    shard,
+    stiffness_flags,
+)
 from .frames import FrameStore, HeldFrames, WrappedFrames, made_of
 from .handles import triple
-from .options import add_option_flags, given, given_options, shard
-from .running import Outputs, with_progress
-from .sources import read_numbers
 
 # An HTML page with a picture and figures of each wrap, the worst first.
 
@@ -98,8 +106,8 @@ def wrap_folder(args, options):
     output, template = output_folder(args), existing_file(args.input, files.MESH_SUFFIXES)
     everything = meshes_in(args.target)
     output.mkdir(parents=True, exist_ok=True)
-    source = sources.Source(args)
-    samples = sources.samples(source, given(args, "wrap", "samples"), options.seed, args)
+    source = files.Source(args)
+    samples = files.samples(source, given(args, "wrap", "samples"), options.seed, args)
     common = made_of(samples, options, template.read_bytes())
     done, failed = {}, []
     number, parts = args.shard or (1, 1)
@@ -107,9 +115,9 @@ def wrap_folder(args, options):
         place = output / f"{path.stem}{template.suffix.lower()}"
         mark = common.copy()
         try:
-            mark.update(sources.content(path))
+            mark.update(files.content(path))
             done[path.name] = read_done(place, mark) or wrap_one(
-                place, mark, lambda path=path: sources.read_distance(path), source, samples, options, args
+                place, mark, lambda path=path: files.read_distance(path), source, samples, options, args
             )
         except (af.InvalidInput, af.Diverged) as error:
             failed.append(f"{path.name}: {error}")
@@ -139,7 +147,7 @@ def output_folder(args):
 
 def meshes_in(folder):
     """The mesh files of a folder; InvalidInput if two have the same stem."""
-    everything = sorted(p for p in Path(folder).iterdir() if p.suffix.lower() in sources.SOURCES)
+    everything = sorted(p for p in Path(folder).iterdir() if p.suffix.lower() in files.SOURCES)
     if not everything:
         raise af.InvalidInput(f"{folder}: holds no mesh")
     names = [path.stem for path in everything]
@@ -213,7 +221,7 @@ NOT_OF_FRAMES = ("shard", "save_field", "suggest", "report")
 
 def frames_of(folder):
     """The meshes of a folder, sorted by the numbers in their names."""
-    paths = [path for path in Path(folder).iterdir() if path.suffix.lower() in sources.SOURCES]
+    paths = [path for path in Path(folder).iterdir() if path.suffix.lower() in files.SOURCES]
     if not paths:
         raise af.InvalidInput(f"{folder}: holds no mesh")
     return sorted(paths, key=lambda path: by_numbers(path.stem))
@@ -238,12 +246,12 @@ def wrap_sequence(args, options, pairs):
         raise af.InvalidInput("no output: give --output")
     with Outputs() as outputs:
         output = outputs.check(args.output, CACHES, "--output")
-    paths, source = frames_of(args.target), sources.Source(args)
+    paths, source = frames_of(args.target), files.Source(args)
     if source.mesh is None:
         raise af.InvalidInput(f"{source.path}: holds no mesh to move")
     vertices = source.mesh.vertices
     files.tell_loss(output, vertices)
-    samples = sources.samples(source, given(args, "wrap", "samples"), options.seed, args)
+    samples = files.samples(source, given(args, "wrap", "samples"), options.seed, args)
     store = FrameStore(output, len(vertices), made_of(samples, options).digest())
     with store.only_run("sequence", [store.place(0, [])]) as first:
         if not first:
@@ -262,8 +270,8 @@ def write_frames(output, frames, paths, pairs, vertices, quiet):
             shape = None
             try:
                 field, report = frames.follow(
-                    sources.content(path),
-                    lambda path=path: sources.read_distance(path),
+                    files.content(path),
+                    lambda path=path: files.read_distance(path),
                     pairs,
                     lambda call, path=path: with_progress(path.stem, call, quiet),
                 )
@@ -355,11 +363,11 @@ def run_one(args, options):
     with Outputs() as outputs:
         places, report = output_places(args, outputs)
         pairs = given_pairs(args)
-        source = sources.Source(args)
+        source = files.Source(args)
         if source.mesh is None and "--output" in places:
             raise af.InvalidInput(f"--output: {source.path} holds no mesh to move; use --save-field")
-        target = sources.read_distance(args.target)
-        samples = sources.samples(source, given(args, "wrap", "samples"), options.seed, args)
+        target = files.read_distance(args.target)
+        samples = files.samples(source, given(args, "wrap", "samples"), options.seed, args)
         if place := places.get("--suggest"):
             found = with_progress(
                 "suggest",

@@ -1,16 +1,175 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin weights of a child's 25 bones by four methods, against 20 random poses of the field.
-
-Ours, Blender's automatic weights (bone heat), libigl's bounded biharmonic weights, and the nearest bone.
-"""
+"""Comparisons by task: registrations, styles, skin weights."""
 
 import time
+from pathlib import Path
 
 import bpy
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 import arapfields as af
+
+from .. import shapes
+from . import theirs
+
+# A dog wrapped onto a twin that a known map bends and swells, beside coherent point drift of pycpd.
+#
+# Both begin in place. Coherent point drift gets samples of both surfaces, and moves all vertices by its
+# kernel.
+
+REGISTRATION = "a dog onto its bent twin"
+POINTS = 2500  # of coherent point drift, on each surface: its time grows with their product
+BEND = 0.5  # turn about the vertical, in radians over the half size
+SWELL = 0.15  # of the fore part's thickness
+SEED = 3
+
+
+def known(points):
+    """The map: a bend about the vertical axis, and a swelling towards the front."""
+    front = np.clip(-points[:, 1] / shapes.HALF_EXTENT, -1, 1)
+    x, z = points[:, 0] * (1 + SWELL * np.maximum(front, 0)), points[:, 2]
+    angle = BEND * front
+    return np.stack(
+        [
+            np.cos(angle) * x - np.sin(angle) * points[:, 1],
+            np.sin(angle) * x + np.cos(angle) * points[:, 1],
+            z,
+        ],
+        1,
+    )
+
+
+def by_drift(rest, triangles, goal, pairs):
+    """Coherent point drift with pycpd's own settings, which are for points of unit spread."""
+    from pycpd import DeformableRegistration
+
+    source = af.sample_mesh(rest, triangles, POINTS, seed=SEED).points
+    target = af.sample_mesh(*goal, POINTS, seed=SEED + 1).points
+    middle, spread = target.mean(0), target.std()
+    solver = DeformableRegistration(X=(target - middle) / spread, Y=(source - middle) / spread)
+    solver.register()
+    places = (rest - middle) / spread
+    kernel = np.exp(-cdist(places, solver.Y, "sqeuclidean") / (2 * solver.beta**2))
+    return (places + kernel @ solver.W) * spread + middle
+
+
+def by_wrap(rest, triangles, goal, pairs):
+    """The default wrap."""
+    return np.asarray(af.wrap(af.sample_mesh(rest, triangles), af.MeshSdf(*goal), pairs)(rest))
+
+
+REGISTRATIONS = (  # and how many pairs of places that correspond each is given
+    ("ours, default", by_wrap, 0),
+    ("ours, default", by_wrap, 10),
+    ("pycpd, coherent point drift", by_drift, 0),
+)
+
+
+def registration_rows():
+    rest, triangles = shapes.own_mesh("dog")
+    twin, goal_triangles = af.extract_surface(af.MeshSdf(rest, triangles), 70)
+    goal = known(twin), goal_triangles
+    diagonal = np.linalg.norm(np.ptp(goal[0], axis=0)) / 100
+    chosen = np.random.default_rng(SEED).choice(
+        len(rest), max(count for *_, count in REGISTRATIONS), replace=False
+    )
+    for name, method, count in REGISTRATIONS:
+        pairs = [(rest[row], known(rest[[row]])[0]) for row in chosen[:count]]
+        begin = time.process_time()
+        moved = method(rest, triangles, goal, pairs)
+        seconds = time.process_time() - begin
+        off = np.linalg.norm(moved - known(rest), axis=1) / diagonal
+        yield {
+            "what": REGISTRATION,
+            "by": name,
+            "pairs": count,
+            "cpu_s": round(seconds, 2),
+            "mean error, % of the diagonal": round(float(off.mean()), 2),
+            "largest of 95 %": round(float(np.quantile(off, 0.95)), 2),
+            "distance to the target, %": round(float(np.abs(af.MeshSdf(*goal)(moved)).mean() / diagonal), 3),
+        }
+
+
+# Styles of clean meshes beside gaussStylization's, of one strength and of the same energy.
+
+OTHERS = ("spot", "bunny", "rockerArm")  # meshes of gaussStylization's checkout
+COW = "common-3d-test-models"  # a checkout that has the cow; without it the cow is left out
+CREATURES = ("dinosaur", "lizard")  # the dog has slivers, which gaussStylization does not take
+STYLES = ("cube", "octahedron", "dodecahedron", "hexagonal prism")
+LAMBDA = 4.0  # as in its own example
+WEIGHTS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # of our finish, for the one of the same energy
+
+
+def meshes(checkout):
+    from support.geometry.meshes import read
+
+    files = {name: checkout / "meshes" / f"{name}.obj" for name in OTHERS}
+    if (cow := checkout.parent / COW / "data" / "cow.obj").is_file():
+        files["cow"] = cow
+    found = {name: read(Path(file))[:2] for name, file in files.items()}
+    return found | {f"our {name}": shapes.own_mesh(name) for name in CREATURES}
+
+
+def ours(vertices, triangles, style):
+    """The field's vertices and the finished ones, and processor seconds of all."""
+    begin = time.process_time()
+    samples = af.sample_mesh(vertices, triangles)
+    before = {"centers": af.CENTERS_BEFORE_SHARPEN, "iterations": af.ITERATIONS_BEFORE_SHARPEN}
+    field = af.stylize(samples, style, af.StylizeOptions(**before))
+    moved = field(vertices)
+    return moved, af.sharpen(vertices, triangles, moved, style), time.process_time() - begin
+
+
+def at_energy(energy, found):
+    """The angle at an energy, from rows measured at several."""
+    energies, angles = np.array(sorted((row["mesh_energy"], row["mean_angle"]) for row in found)).T
+    if not energies[0] <= energy <= energies[-1]:
+        return "not reached"
+    return round(float(np.interp(energy, energies, angles)), 2)
+
+
+def row(module, name, vertices, triangles, style):
+    preferred = af.preferred_normals(style)
+
+    def styled(moved):
+        return theirs.styled(vertices, triangles, moved, preferred)
+
+    moved, seconds, _ = theirs.gauss(module, vertices, triangles, preferred, LAMBDA, "styles")
+    field, finished, own_seconds = ours(vertices, triangles, style)
+    own, is_finite = styled(finished), np.isfinite(moved).all()
+    other = styled(moved) if is_finite else dict.fromkeys(own, "not finite")
+    same = "not finite"
+    if is_finite:
+        options = [af.SharpenOptions(style_weight=weight) for weight in WEIGHTS]
+        curve = [styled(af.sharpen(vertices, triangles, field, style, each)) for each in options]
+        same = at_energy(other["mesh_energy"], curve)
+    return {
+        "what": f"Styles of meshes, gaussStylization at λ = {LAMBDA:g}",
+        "by": f"{name}: {style}",
+        "their_cpu_s": round(seconds, 2),
+        "cpu_s": round(own_seconds, 2),
+        "their_mesh_energy": other["mesh_energy"],
+        "mesh_energy": own["mesh_energy"],
+        "their_mean_angle": other["mean_angle"],
+        "mean_angle": own["mean_angle"],
+        "angle_at_their_energy": same,
+        "folded_percent": own["folded_percent"],
+    }
+
+
+def style_rows(checkout):
+    module = theirs.built_gauss(checkout)
+    for name, (vertices, triangles) in meshes(checkout).items():
+        size = np.ptp(vertices, axis=0).max()
+        for style in STYLES:
+            yield row(module, name, np.asarray(vertices, float) / size, np.asarray(triangles), style)
+
+
+# Skin weights of a child's 25 bones by four methods, against 20 random poses of the field.
+#
+# Ours, Blender's automatic weights (bone heat), libigl's bounded biharmonic weights, and the nearest bone.
 
 WHAT = "weights of a child's 25 bones"
 INFLUENCES = 4
@@ -149,7 +308,7 @@ def unwelded(vertices, triangles):
     return vertices[triangles].reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3)
 
 
-def rows():
+def weight_rows():
     import people
 
     body = people.body(cells=CELLS)
