@@ -89,7 +89,7 @@ class CacheOperator(BakeOperator):
         if taken and not self.overwrite:
             names = ", ".join(path.name for path in taken)
             raise UserError(
-                "{names} is there, and not of this object; overwrite=True replaces it", names=names
+                "{names} is there, and not of this object; Overwrite replaces it", names=names
             )
 
         def make(source, kind, frames):
