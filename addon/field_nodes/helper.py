@@ -20,7 +20,7 @@ from .node_group import AFFINE, FRAME, INSIDE, KERNEL, MAP, MOVE, NODE, PART, PL
 def rows_of(field, local_to_solve, strength=1.0):
     """(n, 27) single precision, a row for each number of columns: part, place, scale, move, inside, map."""
     if not isinstance(field, native.library().RadialField):
-        raise UserError("Nodes know the method Fast alone: neither Neural nor Invertible, no Exact Handles, no wrap")
+        raise UserError("Nodes know the method Fast alone, without Exact Handles or a wrap")
     arrays = field.arrays()
     affine = strength * (arrays["affine"] - np.eye(4, 3, -1))
     scale, inside = -1.0 / (6.0 * arrays["radii"] ** 2), arrays.get("embedded", 0.0)
