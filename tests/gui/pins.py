@@ -155,7 +155,6 @@ def navigation(figures, folder, bar):
 
 
 def undo_checks(figures, folder):
-    bpy.context.preferences.system.viewport_aa = "OFF"  # not needed for undo steps
     bar = set_stage()
     yield 0.5
     before, spot = state(), pixel(END)
