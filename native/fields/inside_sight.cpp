@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "distance/welded_vertices.h"
+#include "mesh/pieces.h"
 
 namespace arapfields {
 namespace {
@@ -25,6 +25,7 @@ constexpr int most_bends = 2;
 
 InsideSight::InsideSight(const TriangleMesh& mesh, const Frame& frame, const Progress& progress)
     : distance_(frame.to_cube(mesh.vertices), mesh.triangles, progress),
+      piece_of_triangle_(pieces_of(mesh)),
       size_(diagonal_of(mesh.vertices) / frame.scale) {
   triangle_normals_.resize(mesh.triangles.rows(), 3);
   for (Index t = 0; t < mesh.triangles.rows(); ++t) {
@@ -32,9 +33,6 @@ InsideSight::InsideSight(const TriangleMesh& mesh, const Frame& frame, const Pro
     triangle_normals_.row(t) =
         (corner(1) - corner(0)).cross(corner(2) - corner(0)).stableNormalized().transpose();
   }
-  const std::vector<Index> pieces = WeldedVertices(mesh).pieces(mesh);
-  for (Index t = 0; t < mesh.triangles.rows(); ++t)
-    piece_of_triangle_.push_back(static_cast<std::int32_t>(pieces[mesh.triangles(t, 0)]));
   is_one_piece_ = std::all_of(piece_of_triangle_.begin(), piece_of_triangle_.end(),
                               [&](std::int32_t piece) { return piece == piece_of_triangle_.front(); });
 }

@@ -14,12 +14,14 @@
 namespace arapfields {
 
 /// Tells which points of a mesh see each other through the inside of the shape: the straight segment between
-/// them, a little below the surface at both ends, meets no triangle of their own connected piece. Points near
-/// each other on one thin and curved sheet, whose segment leaves the shape, see each other by way of places
-/// of the sheet between them. Two faces in one place, each with its own vertices, hide each other.
+/// them, a little below the surface at both ends, meets no triangle of their own piece (mesh/pieces.h).
+/// Points near each other on one thin and curved sheet, whose segment leaves the shape, see each other by way
+/// of places of the sheet between them. Two faces of a piece in one place hide each other; points of
+/// different pieces do not.
 class ARAPFIELDS_EXPORT_TO_TESTS InsideSight {
  public:
-  /// A valid mesh in mesh coordinates, and the frame of the cube in which all points are. Throws Cancelled.
+  /// A valid mesh in mesh coordinates whose triangles face outwards, and the frame of the cube in which all
+  /// points are. Throws Cancelled.
   InsideSight(const TriangleMesh& mesh, const Frame& frame, const Progress& progress = {});
 
   /// Points just below the surface.

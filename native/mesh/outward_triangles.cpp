@@ -8,8 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/parallel.h"
-#include "mesh/is_closed.h"
+#include "mesh/edge_passages.h"
 
 namespace arapfields {
 namespace {
@@ -23,17 +22,6 @@ constexpr double long_boundary = 8.0;
 constexpr double flat = 1e-9;
 /// Vertices of a patch that tell whether it lies inside another one.
 constexpr std::size_t most_witnesses = 16;
-/// Loops run on one thread, in chunks between which a CancelScope is heard.
-constexpr Index rows_at_once = 16384;
-
-/// body(i) for all i below `count`, in order.
-template <class Body>
-void each_in_order(Index count, const Body& body) {
-  const ThreadScope in_order(1);
-  parallel_for(0, count, rows_at_once, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) body(i);
-  });
-}
 
 /// Connected triangles, each with whether it faces the other way than the first one, by union-find.
 class Patches {
@@ -141,42 +129,14 @@ void decide(const TriangleMesh& mesh, std::vector<Patch>& patches) {
 
 Triangles outward_triangles(const TriangleMesh& mesh, Vector* sheet_sizes) {
   validate(mesh);
-  const std::vector<std::int32_t> first = first_at_position(mesh.vertices);
   const Index count = mesh.triangles.rows();
-  // Passages of undirected edges, gathered by the edge's lower vertex.
-  struct Passage {
-    std::int32_t high, triangle;
-    bool upwards;
-  };
-  std::vector<std::uint32_t> begin(first.size() + 1, 0);
-  const auto each_edge = [&](auto&& visit) {
-    each_in_order(count, [&](Index t) {
-      for (int k = 0; k < 3; ++k) {
-        const std::int32_t a = first[mesh.triangles(t, k)], b = first[mesh.triangles(t, (k + 1) % 3)];
-        if (a != b) visit(std::min(a, b), Passage{std::max(a, b), static_cast<std::int32_t>(t), a < b});
-      }
-    });
-  };
-  each_edge([&](std::size_t low, Passage) { ++begin[low + 1]; });
-  for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
-  std::vector<Passage> passages(begin.back());
-  std::vector<std::uint32_t> next(begin.begin(), begin.end() - 1);
-  each_edge([&](std::size_t low, Passage passage) { passages[next[low]++] = passage; });
-
   Patches joined(count);
   std::vector<std::pair<std::int32_t, std::pair<std::int32_t, std::int32_t>>> boundary;  // triangle, edge
-  each_in_order(mesh.vertices.rows(), [&](Index low) {
-    const auto from = passages.begin() + begin[low], to = passages.begin() + begin[low + 1];
-    std::stable_sort(from, to, [](const Passage& a, const Passage& b) { return a.high < b.high; });
-    for (auto p = from; p != to;) {
-      const auto end = std::find_if(p, to, [&](const Passage& other) { return other.high != p->high; });
-      if (end - p == 2)
-        joined.join(p[0].triangle, p[1].triangle, p[0].upwards == p[1].upwards);
-      else if ((end - p) % 2 == 1)
-        for (auto q = p; q != end; ++q)
-          boundary.push_back({q->triangle, {static_cast<std::int32_t>(low), q->high}});
-      p = end;
-    }
+  EdgePassages(mesh.vertices, mesh.triangles).each_edge([&](std::int32_t low, auto from, auto to) {
+    if (to - from == 2)
+      joined.join(from[0].triangle, from[1].triangle, from[0].upwards == from[1].upwards);
+    else if ((to - from) % 2 == 1)
+      for (auto p = from; p != to; ++p) boundary.push_back({p->triangle, {low, p->high}});
   });
 
   std::vector<Patch> patches;

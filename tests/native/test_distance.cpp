@@ -13,6 +13,7 @@
 #include "distance/training_points.h"
 #include "distance/triangle_crossings.h"
 #include "mesh/is_closed.h"
+#include "mesh/pieces.h"
 #include "mesh/sample_mesh.h"
 #include "shapes.h"
 
@@ -192,6 +193,51 @@ BOOST_AUTO_TEST_CASE(closedness_counts_oriented_edges_at_positions) {
   Triangles one_turned = torus.triangles;
   std::swap(one_turned(5, 0), one_turned(5, 1));
   BOOST_TEST(!is_closed(torus.vertices, one_turned));
+}
+
+namespace {
+
+/// Two closed boxes facing outwards, with a vertex of its own for each corner of a triangle: the unit cube,
+/// and it moved by `step`.
+TriangleMesh two_boxes(const Vec3& step) {
+  const int quads[6][4] = {{0, 1, 3, 2}, {4, 6, 7, 5}, {0, 4, 5, 1},
+                           {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}};
+  const int corners[6] = {0, 1, 2, 0, 2, 3};
+  TriangleMesh mesh{Points(72, 3), Triangles(24, 3)};
+  for (int i = 0; i < 72; ++i) {
+    const int corner = quads[i % 36 / 6][corners[i % 6]];
+    for (int k = 0; k < 3; ++k) mesh.vertices(i, k) = (corner >> (2 - k) & 1) + (i < 36 ? 0.0 : step[k]);
+    mesh.triangles(i / 3, i % 3) = i;
+  }
+  return mesh;
+}
+
+}  // namespace
+
+BOOST_AUTO_TEST_CASE(solids_that_touch_are_pieces_of_their_own) {
+  for (const Vec3& step : {Vec3(1, 0, 0), Vec3(1, 1, 0), Vec3(1, 1, 1)}) {  // along a face, an edge, a corner
+    const std::vector<std::int32_t> pieces = pieces_of(two_boxes(step));
+    for (std::size_t t = 0; t < 24; ++t) BOOST_TEST(pieces[t] == (t < 12 ? 0 : 1));
+  }
+}
+
+BOOST_AUTO_TEST_CASE(walls_of_a_slit_are_of_one_piece) {
+  // Without one triangle of the wall between the boxes, on both sides, what is left of it is a slit.
+  TriangleMesh mesh = two_boxes(Vec3(1, 0, 0));
+  for (const Index row : {13, 2}) {
+    const Index below = mesh.triangles.rows() - 1 - row;
+    mesh.triangles.middleRows(row, below) = Triangles(mesh.triangles.bottomRows(below));
+    mesh.triangles.conservativeResize(row + below, 3);
+  }
+  BOOST_TEST(is_closed(mesh.vertices, mesh.triangles));
+  for (const std::int32_t piece : pieces_of(mesh)) BOOST_TEST(piece == 0);
+}
+
+BOOST_AUTO_TEST_CASE(open_pieces_are_joined_by_vertices) {
+  TriangleMesh mesh{Points(5, 3), Triangles(2, 3)};
+  mesh.vertices << 0, 0, 0, 1, 0, 0, 0, 1, 0, -1, 0, 0, 0, -1, 0;
+  mesh.triangles << 0, 1, 2, 0, 3, 4;
+  for (const std::int32_t piece : pieces_of(mesh)) BOOST_TEST(piece == 0);
 }
 
 BOOST_AUTO_TEST_CASE(results_do_not_depend_on_threads_and_a_cancel_is_heard) {

@@ -293,6 +293,32 @@ def test_folds_and_limbs_of_ordinary_shapes_are_not_torn(name, data_dir):
     assert np.max(edges(deformed) / edges(vertices)) < LONGEST_EDGE
 
 
+def stacked_boxes(count=4):
+    """Boxes of 1 × 0.6 × 0.6 in a row along x, each closed, with corners where those of the next one are."""
+    vertices, triangles = meshes.box((0.5, 0.3, 0.3))
+    for _ in range(2):
+        vertices, triangles = meshes.subdivide(vertices, triangles)
+    return meshes.together(*((vertices + (i, 0, 0), triangles) for i in range(count)))
+
+
+@pytest.mark.parametrize("corners", ["shared", "one a triangle"])
+def test_solids_that_touch_along_whole_faces_stay_together(corners):
+    """Each is a piece of its own, and pieces do not hide each other; walls of one piece do."""
+    vertices, triangles = stacked_boxes()
+    if corners == "one a triangle":
+        vertices, triangles = vertices[triangles].reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3)
+    first, last = box((-0.6, -0.4, -0.4), (0.2, 0.4, 0.4)), box((2.8, -0.4, -0.4), (3.6, 0.4, 0.4))
+    handles = [moved(first), moved(last, turn((0, 1, 0), 60.0, (1.5, 0.0, 0.0)))]
+    field = af.deform(af.sample_mesh(vertices, triangles, count=8000), handles)
+    deformed = field.apply(vertices, triangles=triangles)
+    _, places = np.unique(vertices, axis=0, return_inverse=True)
+    low, high = np.full_like(vertices, np.inf), np.full_like(vertices, -np.inf)
+    np.minimum.at(low, places.ravel(), deformed)
+    np.maximum.at(high, places.ravel(), deformed)
+    assert np.abs(deformed - low[places.ravel()]).max() < 1e-9
+    assert np.abs(deformed - high[places.ravel()]).max() < 1e-9
+
+
 def test_vertices_without_triangles_take_the_nearest_side():
     vertices, triangles, _, field = solved(0.02)
     assert np.allclose(field(vertices), field.apply(vertices, triangles=triangles), atol=1e-9)
