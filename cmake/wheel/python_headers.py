@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Headers of the Pythons of Blender's versions: this system's, else from Debian's packages.
+"""Headers of the wheels' Pythons: this system's, else from Debian's packages.
 
 Packages are downloaded by apt-get to a separate folder with separate package lists, without root and without
 changes to the system.
@@ -34,11 +34,18 @@ def header_version(folder):
 
 def at_hand(version):
     """The folder of a Python's headers on this system, or None."""
-    for pattern in SEARCHED:
-        for folder in sorted(Path("/").glob(f"{pattern.lstrip('/')}/python{version[0]}.{version[1]}")):
-            if header_version(folder) == version:
-                return folder
-    return None
+    name = "python{}.{}".format(*version)
+    found = [folder for one in SEARCHED for folder in sorted(Path("/").glob(f"{one.lstrip('/')}/{name}"))]
+    return next((folder for folder in [*found, *of_program(name)] if header_version(folder) == version), None)
+
+
+def of_program(name):
+    """[folder of the headers] of a Python in PATH."""
+    asked = "import sysconfig; print(sysconfig.get_path('include'))"
+    try:
+        return [Path(run(name, "-c", asked).strip())]
+    except (OSError, RuntimeError):
+        return []
 
 
 def headers(version, work):
@@ -84,6 +91,8 @@ def options(release, state):
 
 def fetch(version):
     """Downloads and unpacks the headers of a Python to FETCHED; returns their folder."""
+    if version not in RELEASES:
+        raise RuntimeError("no headers of Python {0}.{1}: needs python{0}.{1} in PATH".format(*version))
     package = "libpython{}.{}-dev".format(*version)
     folder = FETCHED / RELEASES[version]
     settings = options(RELEASES[version], folder / "apt")

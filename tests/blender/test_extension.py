@@ -138,7 +138,7 @@ def test_batches_in_blender_itself(extension, blender):
 def test_a_repository_serves_the_zip(extension, blender, tmp_path):
     """server-generate's index.json is all that Blender needs to list, fetch and install the extension."""
     sys.path.insert(0, str(ROOT / "blender_scripts"))
-    from extension.blender import extension_tool
+    from build_extension import extension_tool
 
     folder = tmp_path / "repository"
     folder.mkdir()

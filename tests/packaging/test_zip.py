@@ -25,7 +25,7 @@ LINUX, MACS = PLATFORMS["linux-x64"], PLATFORMS["macos-arm64"]
 
 @pytest.fixture
 def wheels(tmp_path):
-    paths = [tmp_path / f"arapfields-0.1.0-{MACS.wheel_tags(pythons)}.whl" for pythons in MACS.wheels]
+    paths = [tmp_path / f"arapfields-0.1.0-{MACS.wheel_tags(pythons)}.whl" for pythons in MACS.extension_wheels]
     for path in paths:
         with zipfile.ZipFile(path, "w") as wheel:
             wheel.writestr("arapfields/options.json", path.name)
