@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "core/dependent.h"
 #include "core/jets.h"
 #include "solve/contact/parameters.h"
 
