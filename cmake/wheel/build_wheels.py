@@ -16,10 +16,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import check_wheel
 import python_headers
-from platforms import BLENDERS, PLATFORMS, PYTHONS, ROOT, definitions, python_library, run
+from platforms import PLATFORMS, ROOT, definitions, python_library, run
 
 WORK = ROOT / "build"
-HEADERS = WORK / "python-headers/flat"
 STUBS = "python/arapfields/_native.pyi"
 
 
@@ -38,26 +37,12 @@ def module_name(version):
     return "_native_cp{}{}".format(*version)
 
 
-def pythons_at_hand(whole):
-    """The Pythons whose headers are to be had. Only if `whole` must it be all of them: the zips need Blender's."""
-    found = []
-    for version in PYTHONS:
-        try:
-            python_headers.headers(version, HEADERS)
-            found.append(version)
-        except RuntimeError as error:
-            if whole or version in BLENDERS:
-                raise
-            print(f"left out: {error}", flush=True)
-    return found
-
-
 def settings(platform, build, pythons):
     """CMake definitions of a platform's build, with the modules for these Pythons."""
     (build / "tools").mkdir(parents=True, exist_ok=True)
     modules = []
     for version in pythons:
-        headers = python_headers.headers(version, HEADERS)
+        headers = python_headers.headers(version)
         library = python_library(platform, version, headers, build / "tools")
         modules.append(f"{module_name(version)}|{headers}|{platform.module_suffix(version)}|{library}")
     given = {"ARAPFIELDS_MODULES": ";".join(modules), "ARAPFIELDS_WERROR": "ON"}
@@ -113,11 +98,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("platforms", nargs="+", choices=[*PLATFORMS, "all"], metavar="platform")
     parser.add_argument("--output", type=Path, default=ROOT / "dist")
-    parser.add_argument("--whole", action="store_true", help="refuse if headers of a Python are not to be had")
+    parser.add_argument(
+        "--whole", action="store_true", help="refuse if headers of a Python are not to be had"
+    )
     given = parser.parse_args()
     names = list(PLATFORMS) if "all" in given.platforms else given.platforms
     given.output.mkdir(parents=True, exist_ok=True)
-    served = pythons_at_hand(given.whole)
+    served = python_headers.pythons(given.whole)
     for name in names:
         start = time.monotonic()
         print(f"{name}: some minutes the first time; all output: {WORK / name / 'build.log'}", flush=True)

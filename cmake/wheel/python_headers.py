@@ -9,11 +9,12 @@ import re
 import shutil
 from pathlib import Path
 
-from platforms import ROOT, run
+from platforms import BLENDERS, PYTHONS, ROOT, run
 
 RELEASES = {(3, 11): "bookworm", (3, 13): "trixie", (3, 14): "sid"}  # Debian releases with that Python
 KEYRING = "/usr/share/keyrings/debian-archive-keyring.gpg"
 FETCHED = ROOT / "build/python-headers"
+COPIED = FETCHED / "flat"
 SEARCHED = [
     f"{FETCHED}/*/usr/include",
     "/usr/include",
@@ -34,30 +35,44 @@ def header_version(folder):
 
 def at_hand(version):
     """The folder of a Python's headers on this system, or None."""
-    name = "python{}.{}".format(*version)
-    found = [folder for one in SEARCHED for folder in sorted(Path("/").glob(f"{one.lstrip('/')}/{name}"))]
-    return next((folder for folder in [*found, *of_program(name)] if header_version(folder) == version), None)
+    folders = candidates("python{}.{}".format(*version))
+    return next((folder for folder in folders if header_version(folder) == version), None)
 
 
-def of_program(name):
-    """[folder of the headers] of a Python in PATH."""
-    asked = "import sysconfig; print(sysconfig.get_path('include'))"
+def candidates(name):
+    """Folders that may hold the headers of a Python: those searched, and that of the program in PATH."""
+    for pattern in SEARCHED:
+        yield from sorted(Path("/").glob(f"{pattern.lstrip('/')}/{name}"))
     try:
-        return [Path(run(name, "-c", asked).strip())]
+        yield Path(run(name, "-c", "import sysconfig; print(sysconfig.get_path('include'))").strip())
     except (OSError, RuntimeError):
-        return []
+        return
 
 
-def headers(version, work):
-    """Copies a Python's headers to `work`, with a pyconfig.h for all platforms; returns the path."""
+def headers(version):
+    """Copies a Python's headers to COPIED, with a pyconfig.h for all platforms; returns the path."""
     source = at_hand(version) or fetch(version)
-    copy = Path(work) / source.name
+    copy = COPIED / source.name
     if not copy.is_dir():
         shutil.copytree(source, copy, ignore=shutil.ignore_patterns("internal"))
     config = (ROOT / "cmake/wheel/pyconfig.h").read_bytes()
     if (copy / "pyconfig.h").read_bytes() != config:
         (copy / "pyconfig.h").write_bytes(config)
     return copy
+
+
+def pythons(whole):
+    """The Pythons whose headers are to be had: all of them if `whole`, at least Blender's, for the zips."""
+    found = []
+    for version in PYTHONS:
+        try:
+            headers(version)
+            found.append(version)
+        except RuntimeError as error:
+            if whole or version in BLENDERS:
+                raise
+            print(f"left out: {error}", flush=True)
+    return found
 
 
 def mirror():

@@ -179,6 +179,13 @@ def test_blenders_own_importers_read_the_same_splats(count, tmp_path):
     assert "IMPORTED" in done.stdout
 
 
+@pytest.mark.slow
+def test_splats_of_blenders_own_importer_are_posed_by_the_zip(extension, tmp_path):
+    newest = blenders.find(blenders.VERSIONS[-1], tmp_path)
+    done = newest.run("installed_splats.py", extension, tmp_path)
+    assert "POSED" in done.stdout
+
+
 # A script that registers the add-on in Python's own bpy and simply ends must end.
 
 EXIT_LIMIT = 60  # seconds; it hung for ever where it failed

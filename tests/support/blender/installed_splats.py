@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Script for a separate Blender with splats of its own: the extension from a zip poses a cloud that Blender's own
-importer read, by a solve and live; the posed cloud is rendered, saved, reopened, written and imported again.
+"""Script for a separate Blender with splats of its own: the extension from a zip poses a cloud that Blender's
+own importer read, by a solve and live; the posed cloud is rendered, saved, reopened, written, imported again.
 
-python installed_splats.py ZIP BAR.ply FOLDER
+python installed_splats.py ZIP FOLDER
 """
 
 import importlib
@@ -72,13 +72,14 @@ def decibels(one, other):
     return float(-10 * np.log10(max(np.mean((one - other) ** 2), 1e-12)))
 
 
-def use(cloud, folder):
+def use(folder):
     import numpy as np
-    from support.blender import scenes
+    from support.blender import scans, scenes
 
     sessions = importlib.import_module(f"{installed.MODULE}.live.sessions")
     bpy.ops.wm.read_homefile(use_empty=True)
-    item = imported(cloud)
+    scans.given(2000, 4).save(folder / "bar.ply")
+    item = imported(folder / "bar.ply")
     item.name = "Scan"
     rest = shown(item)
     fixed = scenes.cube_empty((-0.9, 0, 0), (0.15, 0.4, 0.4), "Fixed")
@@ -104,7 +105,7 @@ def use(cloud, folder):
         moving.location.z = height
         bpy.context.view_layer.update()
         sessions.update(bpy.context, wait=60.0, refined=True)
-        check("live", height - 0.0)
+        check("live", height)
     scenes.activate(item)
     assert bpy.ops.arapfields.live_keep() == {"FINISHED"}
     posed = shown(item)
@@ -141,9 +142,8 @@ if __name__ == "__main__":
     sys.meta_path.insert(0, installed.FromTheExtension)
     import bpy
 
-    zip_path, cloud, folder = sys.argv[1:]
-    installed.install(zip_path)
-    use(Path(cloud), Path(folder))
+    installed.install(sys.argv[1])
+    use(Path(sys.argv[2]))
     print(f"POSED {bpy.app.version_string}")
     sys.stdout.flush()
     os._exit(0)  # see installed.py
