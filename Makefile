@@ -218,14 +218,14 @@ wheel-tools: $(VENV)/.ready
 	$(COMPILER)
 	@$(PIP) -q -r cmake/wheel/requirements.txt
 
-wheels: wheel-tools  ## for pip, in dist: wheels for Blender's Pythons; PLATFORM=linux-arm64, windows-x64, windows-arm64, macos-arm64, macos-x64 or all
-	$(PY) cmake/wheel/build_wheels.py $(PLATFORM) --output dist
+wheels: wheel-tools  ## for pip, in dist: wheels for Python 3.11 to 3.14; PLATFORM=linux-arm64, windows-x64, windows-arm64, macos-arm64, macos-x64 or all
+	$(PY) cmake/wheel/build_wheels.py $(PLATFORM) $(WHOLE) --output dist
 
 extension: wheels $(BLENDER)  ## for Blender: dist/arapfields-<version>-linux-x64.zip, of these wheels; PLATFORM as above
 	$(PY) blender_scripts/build_extension.py $(PLATFORM) --output dist
 
 release: git-clone  ## all that is published, in dist: wheels, zips, index.json, source distribution, licences, checksums
-	$(MAKE) --no-print-directory extension PLATFORM=all
+	$(MAKE) --no-print-directory extension PLATFORM=all WHOLE=--whole
 	$(PY) cmake/wheel/release.py --output dist
 
 # What PyPI has of other Blenders, for tests/blender/test_extension.py; those from 5.1 on need a Python 3.13.

@@ -210,8 +210,8 @@ def arguments():
 
 
 def own_wheels(platform, folder, version):
-    """The wheels for all Pythons, built by build_wheels.py."""
-    names = map(platform.wheel_tags, platform.wheels)
+    """The wheels for Blender's Pythons, built by build_wheels.py."""
+    names = map(platform.wheel_tags, platform.extension_wheels)
     wheels = [folder / f"arapfields-{version}-{name}.whl" for name in names]
     missing = [wheel.name for wheel in wheels if not wheel.exists()]
     if missing:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the wheels of `arapfields` for each platform and each of Blender's Pythons, on Linux.
+"""Builds the wheels of `arapfields` for each platform and Python, on Linux.
 
 python cmake/wheel/build_wheels.py linux-x64 windows-x64 --output dist
 """
@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import check_wheel
 import python_headers
-from platforms import PLATFORMS, PYTHONS, ROOT, definitions, python_library, run
+from platforms import PLATFORMS, ROOT, definitions, python_library, run
 
 WORK = ROOT / "build"
 STUBS = "python/arapfields/_native.pyi"
@@ -37,12 +37,12 @@ def module_name(version):
     return "_native_cp{}{}".format(*version)
 
 
-def settings(platform, build):
-    """CMake definitions of a platform's build, with the modules for all Pythons."""
+def settings(platform, build, pythons):
+    """CMake definitions of a platform's build, with the modules for these Pythons."""
     (build / "tools").mkdir(parents=True, exist_ok=True)
     modules = []
-    for version in PYTHONS:
-        headers = python_headers.headers(version, WORK / "python-headers/flat")
+    for version in pythons:
+        headers = python_headers.headers(version)
         library = python_library(platform, version, headers, build / "tools")
         modules.append(f"{module_name(version)}|{headers}|{platform.module_suffix(version)}|{library}")
     given = {"ARAPFIELDS_MODULES": ";".join(modules), "ARAPFIELDS_WERROR": "ON"}
@@ -51,14 +51,14 @@ def settings(platform, build):
     return given | definitions(platform, build / "tools")
 
 
-def build_wheels(platform, output):
-    """Builds and checks the platform's wheels in `output`; returns their paths."""
+def build_wheels(platform, output, served):
+    """Builds and checks the platform's wheels for the Pythons `served` in `output`; returns their paths."""
     build = WORK / platform.name
-    targets = [*map(module_name, PYTHONS), "stubs"]
+    targets = [*map(module_name, served), "stubs"]
     options = [f"build-dir={build}", "install.strip=false", f"build.targets={';'.join(targets)}"]
-    options += [f"cmake.define.{name}={value}" for name, value in settings(platform, build).items()]
+    options += [f"cmake.define.{name}={value}" for name, value in settings(platform, build, served).items()]
     made = []
-    for pythons in platform.wheels:
+    for pythons in [those for those in platform.wheels if set(those) <= set(served)]:
         tags = ["cp{0}{1}-cp{0}{1}-{2}".format(*version, platform.tag) for version in pythons]
         own = [
             f"wheel.tags={';'.join(tags)}",
@@ -98,13 +98,17 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("platforms", nargs="+", choices=[*PLATFORMS, "all"], metavar="platform")
     parser.add_argument("--output", type=Path, default=ROOT / "dist")
+    parser.add_argument(
+        "--whole", action="store_true", help="refuse if headers of a Python are not to be had"
+    )
     given = parser.parse_args()
     names = list(PLATFORMS) if "all" in given.platforms else given.platforms
     given.output.mkdir(parents=True, exist_ok=True)
+    served = python_headers.pythons(given.whole)
     for name in names:
         start = time.monotonic()
         print(f"{name}: some minutes the first time; all output: {WORK / name / 'build.log'}", flush=True)
-        for path in build_wheels(PLATFORMS[name], given.output.resolve()):
+        for path in build_wheels(PLATFORMS[name], given.output.resolve(), served):
             print(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")
         print(f"{name}: {time.monotonic() - start:.0f} s")
 

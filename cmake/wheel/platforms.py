@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PYTHONS = [(3, 11), (3, 13), (3, 14)]  # of the Blender versions that the extension supports
+PYTHONS = [(3, 11), (3, 12), (3, 13), (3, 14)]
+BLENDERS = [(3, 11), (3, 13), (3, 14)]  # of the Blender versions that the extension supports
 GLIBC = (2, 28)
 MACOS = (11, 0)
 ONE_MODULE = {"ARAPFIELDS_ONE_MODULE": "ON"}
@@ -36,8 +37,13 @@ class Platform:
 
     @property
     def wheels(self):
-        """The Pythons of each wheel: one wheel for all if the library is a separate file."""
-        return [PYTHONS] if self.library else [[version] for version in PYTHONS]
+        """The Pythons of each wheel."""
+        return self.extension_wheels + [[version] for version in PYTHONS if version not in BLENDERS]
+
+    @property
+    def extension_wheels(self):
+        """The Pythons of each wheel in the zip: one wheel for all if the library is a separate file."""
+        return [BLENDERS] if self.library else [[version] for version in BLENDERS]
 
     def wheel_tags(self, pythons):
         """The tags in a wheel's file name."""

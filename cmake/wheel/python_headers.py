@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Headers of the Pythons of Blender's versions: this system's, else from Debian's packages.
+"""Headers of the wheels' Pythons: this system's, else from Debian's packages.
 
 Packages are downloaded by apt-get to a separate folder with separate package lists, without root and without
 changes to the system.
@@ -9,11 +9,12 @@ import re
 import shutil
 from pathlib import Path
 
-from platforms import ROOT, run
+from platforms import BLENDERS, PYTHONS, ROOT, run
 
 RELEASES = {(3, 11): "bookworm", (3, 13): "trixie", (3, 14): "sid"}  # Debian releases with that Python
 KEYRING = "/usr/share/keyrings/debian-archive-keyring.gpg"
 FETCHED = ROOT / "build/python-headers"
+COPIED = FETCHED / "flat"
 SEARCHED = [
     f"{FETCHED}/*/usr/include",
     "/usr/include",
@@ -34,23 +35,44 @@ def header_version(folder):
 
 def at_hand(version):
     """The folder of a Python's headers on this system, or None."""
+    folders = candidates("python{}.{}".format(*version))
+    return next((folder for folder in folders if header_version(folder) == version), None)
+
+
+def candidates(name):
+    """Folders that may hold the headers of a Python: those searched, and that of the program in PATH."""
     for pattern in SEARCHED:
-        for folder in sorted(Path("/").glob(f"{pattern.lstrip('/')}/python{version[0]}.{version[1]}")):
-            if header_version(folder) == version:
-                return folder
-    return None
+        yield from sorted(Path("/").glob(f"{pattern.lstrip('/')}/{name}"))
+    try:
+        yield Path(run(name, "-c", "import sysconfig; print(sysconfig.get_path('include'))").strip())
+    except (OSError, RuntimeError):
+        return
 
 
-def headers(version, work):
-    """Copies a Python's headers to `work`, with a pyconfig.h for all platforms; returns the path."""
+def headers(version):
+    """Copies a Python's headers to COPIED, with a pyconfig.h for all platforms; returns the path."""
     source = at_hand(version) or fetch(version)
-    copy = Path(work) / source.name
+    copy = COPIED / source.name
     if not copy.is_dir():
         shutil.copytree(source, copy, ignore=shutil.ignore_patterns("internal"))
     config = (ROOT / "cmake/wheel/pyconfig.h").read_bytes()
     if (copy / "pyconfig.h").read_bytes() != config:
         (copy / "pyconfig.h").write_bytes(config)
     return copy
+
+
+def pythons(whole):
+    """The Pythons whose headers are to be had: all of them if `whole`, at least Blender's, for the zips."""
+    found = []
+    for version in PYTHONS:
+        try:
+            headers(version)
+            found.append(version)
+        except RuntimeError as error:
+            if whole or version in BLENDERS:
+                raise
+            print(f"left out: {error}", flush=True)
+    return found
 
 
 def mirror():
@@ -84,6 +106,8 @@ def options(release, state):
 
 def fetch(version):
     """Downloads and unpacks the headers of a Python to FETCHED; returns their folder."""
+    if version not in RELEASES:
+        raise RuntimeError("no headers of Python {0}.{1}: needs python{0}.{1} in PATH".format(*version))
     package = "libpython{}.{}-dev".format(*version)
     folder = FETCHED / RELEASES[version]
     settings = options(RELEASES[version], folder / "apt")

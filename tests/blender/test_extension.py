@@ -138,7 +138,7 @@ def test_batches_in_blender_itself(extension, blender):
 def test_a_repository_serves_the_zip(extension, blender, tmp_path):
     """server-generate's index.json is all that Blender needs to list, fetch and install the extension."""
     sys.path.insert(0, str(ROOT / "blender_scripts"))
-    from extension.blender import extension_tool
+    from build_extension import extension_tool
 
     folder = tmp_path / "repository"
     folder.mkdir()
@@ -177,6 +177,13 @@ def test_blenders_own_importers_read_the_same_splats(count, tmp_path):
         splat_files.write(path, posed)
     done = newest.run("imported_splats.py", tmp_path / "posed.npz", *paths)
     assert "IMPORTED" in done.stdout
+
+
+@pytest.mark.slow
+def test_splats_of_blenders_own_importer_are_posed_by_the_zip(extension, tmp_path):
+    newest = blenders.find(blenders.VERSIONS[-1], tmp_path)
+    done = newest.run("installed_splats.py", extension, tmp_path)
+    assert "POSED" in done.stdout
 
 
 # A script that registers the add-on in Python's own bpy and simply ends must end.

@@ -14,7 +14,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
-from support.programs.environments import fresh, run
+from support.programs.environments import fresh, python_of, run
 
 import arapfields
 
@@ -22,6 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "cmake/wheel"))
 
 import release  # noqa: E402
+from platforms import PYTHONS  # noqa: E402
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 # What the README's lines take for granted: a mesh, and three boxes.
@@ -51,10 +52,37 @@ def five_lines():
     return re.search(r"## Five lines of Python\n+```python\n(.*?)```", text, flags=re.S)[1]
 
 
+def notebook():
+    """The code of the notebook, as one script."""
+    cells = json.loads((ROOT / "docs/examples/pose.ipynb").read_text(encoding="utf-8"))["cells"]
+    return "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
+
+
 @pytest.mark.slow
-def test_the_five_lines_of_the_readme_run_from_the_wheel(environment, tmp_path):
-    said = run(environment, "-c", GIVEN + five_lines() + CHECKED, cwd=tmp_path)
+@pytest.mark.parametrize("version", PYTHONS, ids="{0[0]}.{0[1]}".format)
+def test_the_five_lines_of_the_readme_and_the_notebook_run_from_the_wheel(built, version, tmp_path):
+    """In an environment of each Python with the wheel that pip chooses for it."""
+    program = python_of(version)
+    if program is None:
+        pytest.skip("no such Python on this system")
+    chosen = (
+        "--find-links",
+        built[0].parent,
+        "--only-binary",
+        "arapfields",
+        f"arapfields=={PROJECT['version']}",
+    )
+    python = fresh(tmp_path, *chosen, python=program)
+    said = run(python, "-c", GIVEN + five_lines() + CHECKED, cwd=tmp_path)
     assert said.startswith(f"bent {PROJECT['version']}") and "site-packages" in said
+    run(python, "-m", "pip", "install", "-q", "--disable-pip-version-check", "matplotlib")
+    run(python, "-c", notebook(), cwd=tmp_path)
+    assert (tmp_path / "posed.png").stat().st_size > 10_000
+
+
+def test_the_pythons_of_wheels_are_those_that_are_declared():
+    declared = [name.rpartition(" ")[2] for name in PROJECT["classifiers"] if " :: 3." in name]
+    assert declared == ["{}.{}".format(*version) for version in PYTHONS]
 
 
 @pytest.mark.slow

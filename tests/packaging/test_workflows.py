@@ -2,6 +2,7 @@
 """Files that other services read: workflows, words of the Makefile, citation."""
 
 import re
+import sys
 import tomllib
 from pathlib import Path
 
@@ -9,8 +10,12 @@ import pytest
 
 # The continuous integration files: well-formed, plain about not having been run, in step with the rest.
 
-yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "cmake/wheel"))
+
+from platforms import PYTHONS  # noqa: E402
+
+yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
 FILES = sorted((ROOT / ".github/workflows").glob("*.yml"))
 
 
@@ -31,8 +36,9 @@ def test_workflows_run_existing_commands(path):
 
 def test_wheels_are_tried_on_every_system():
     content = yaml.safe_load((ROOT / ".github/workflows/release.yml").read_text())
-    systems = content["jobs"]["elsewhere"]["strategy"]["matrix"]["system"]
-    assert {name.split("-")[0] for name in systems} == {"ubuntu", "windows", "macos"}
+    matrix = content["jobs"]["elsewhere"]["strategy"]["matrix"]
+    assert {name.split("-")[0] for name in matrix["system"]} == {"ubuntu", "windows", "macos"}
+    assert matrix["python"] == ["{}.{}".format(*version) for version in PYTHONS]
 
 
 def test_every_word_of_make_is_described():

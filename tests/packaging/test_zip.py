@@ -16,7 +16,7 @@ sys.path[:0] = [str(ROOT / "blender_scripts"), str(ROOT / "cmake/wheel")]
 
 import build_extension  # noqa: E402
 import python_headers  # noqa: E402
-from platforms import PLATFORMS, PYTHONS, declared  # noqa: E402
+from platforms import BLENDERS, PLATFORMS, PYTHONS, declared  # noqa: E402
 
 # What make extension and make wheels refuse: parts that lack, wheels that were changed, foreign needs.
 
@@ -25,7 +25,9 @@ LINUX, MACS = PLATFORMS["linux-x64"], PLATFORMS["macos-arm64"]
 
 @pytest.fixture
 def wheels(tmp_path):
-    paths = [tmp_path / f"arapfields-0.1.0-{MACS.wheel_tags(pythons)}.whl" for pythons in MACS.wheels]
+    paths = [
+        tmp_path / f"arapfields-0.1.0-{MACS.wheel_tags(pythons)}.whl" for pythons in MACS.extension_wheels
+    ]
     for path in paths:
         with zipfile.ZipFile(path, "w") as wheel:
             wheel.writestr("arapfields/options.json", path.name)
@@ -70,6 +72,32 @@ def test_incomplete_zips_are_refused(wheels, tmp_path, monkeypatch):
         RuntimeError, match=r"lacks arapfields-0.1.0-cp311\.cp313\.cp314-cp311.*PLATFORM=linux-x64"
     ):
         build_extension.own_wheels(LINUX, tmp_path, "0.1.0")
+
+
+def test_a_python_without_headers_is_left_out_unless_blender_has_it(monkeypatch, capsys):
+    """Debian has no Python 3.12: the zips are built without it, a release is not."""
+
+    def lacking(missing):
+        def headers(version):
+            if version == missing:
+                raise RuntimeError("no headers of Python {}.{}".format(*version))
+
+        return headers
+
+    monkeypatch.setattr(python_headers, "headers", lacking((3, 12)))
+    assert python_headers.pythons(False) == BLENDERS
+    assert "left out: no headers of Python 3.12" in capsys.readouterr().out
+    with pytest.raises(RuntimeError, match=r"3\.12"):
+        python_headers.pythons(True)
+    monkeypatch.setattr(python_headers, "headers", lacking((3, 13)))
+    with pytest.raises(RuntimeError, match=r"3\.13"):
+        python_headers.pythons(False)
+
+
+def test_headers_that_nobody_has_are_refused(monkeypatch):
+    monkeypatch.setattr(python_headers, "at_hand", lambda version: None)
+    with pytest.raises(RuntimeError, match=r"needs python3\.12 in PATH"):
+        python_headers.headers((3, 12))
 
 
 ASKED = """

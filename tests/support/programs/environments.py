@@ -23,9 +23,19 @@ def run(*command, code=0, **keywords):
     return done.stdout
 
 
-def fresh(folder, *wanted):
+def python_of(version):
+    """A Python of that version, (major, minor), in PATH or of pyenv; None without one."""
+    name = "python{}.{}".format(*version)
+    pyenv = sorted(Path.home().glob(f".pyenv/versions/*/bin/{name}"))
+    for program in filter(None, [shutil.which(name), *pyenv]):
+        if not subprocess.run([program, "-c", "import venv"], capture_output=True).returncode:
+            return program
+    return None
+
+
+def fresh(folder, *wanted, python=sys.executable):
     """The Python of a new virtual environment in `folder` with the packages `wanted`."""
-    run(sys.executable, "-m", "venv", folder / "venv")
+    run(python, "-m", "venv", folder / "venv")
     python = folder / "venv" / "bin" / "python"
     run(python, "-m", "pip", "install", "-q", "--disable-pip-version-check", *wanted)
     return python
