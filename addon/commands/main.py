@@ -10,7 +10,6 @@ import sys
 
 from ..core.errors import UserError, as_user_error
 from ..core.runtime import native, self_check
-from .batch import Launch, end_with_parent
 
 
 def run(arguments, script=None):
@@ -28,6 +27,7 @@ def run(arguments, script=None):
     from arapfields._streams import open_streams
     from arapfields.cli.command_line import failed
 
+    from .batch import Launch, end_with_parent
     from .parser import parse
 
     open_streams()
