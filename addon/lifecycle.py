@@ -19,9 +19,8 @@ from .jobs import job_operator
 from .jobs.display import display
 from .live import live_modifier, recovery, sessions
 from .live.live_solver import prefetch
-from .pin_tool import drawing as pin_drawing
-from .pin_tool import tool
-from .pin_tool.hints import status
+from .pin_tool import drawing, tool
+from .pin_tool.drawing import status
 from .pin_tool.hover import hover
 from .poses import applying
 from .solver import style_settings
@@ -128,8 +127,8 @@ HANDLERS = {  # of bpy.app.handlers
 }
 DRAWINGS = (  # over every 3D viewport
     *((overlays.draw_previews, "POST_VIEW"), (overlays.draw_handle_boxes, "POST_VIEW")),
-    *((pin_drawing.draw, "POST_VIEW"), (recovery.draw_touching, "POST_VIEW")),
-    *((landmark_tools.draw, "POST_PIXEL"), (pin_drawing.draw_label, "POST_PIXEL")),
+    *((drawing.draw, "POST_VIEW"), (recovery.draw_touching, "POST_VIEW")),
+    *((landmark_tools.draw, "POST_PIXEL"), (drawing.draw_label, "POST_PIXEL")),
     (first_run.draw, "POST_PIXEL"),
 )
 PARTS = (  # what begins with the extension, and how it ends
