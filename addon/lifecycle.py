@@ -17,11 +17,10 @@ from .field_modifier import layers, motion
 from .handles import applied_transforms, empties, held_counts, left_behind, overlays, symmetry
 from .jobs import job_operator
 from .jobs.display import display
-from .live import recovery, sessions, stored
+from .live import live_modifier, recovery, sessions
 from .live.live_solver import prefetch
-from .pin_tool import drawing as pin_drawing
-from .pin_tool import tool
-from .pin_tool.hints import status
+from .pin_tool import drawing, tool
+from .pin_tool.drawing import status
 from .pin_tool.hover import hover
 from .poses import applying
 from .solver import style_settings
@@ -33,7 +32,7 @@ from .wrap import landmark_tools, landmarks
 def before_load(*_):
     """The file is about to go: whatever works on it ends, and nothing of it is applied."""
     passing = (jobs.board, held_counts.pending, source_surface.changed, empties.seen_active, prefetch)
-    for state in (*passing, applying.solved, solve_job.steps, left_behind.seen, stored.shapes):
+    for state in (*passing, applying.solved, solve_job.steps, left_behind.seen, live_modifier.shapes):
         state.clear()
     applied_transforms.seen.clear()
     applied_transforms.followed.clear()
@@ -128,8 +127,8 @@ HANDLERS = {  # of bpy.app.handlers
 }
 DRAWINGS = (  # over every 3D viewport
     *((overlays.draw_previews, "POST_VIEW"), (overlays.draw_handle_boxes, "POST_VIEW")),
-    *((pin_drawing.draw, "POST_VIEW"), (recovery.draw_touching, "POST_VIEW")),
-    *((landmark_tools.draw, "POST_PIXEL"), (pin_drawing.draw_label, "POST_PIXEL")),
+    *((drawing.draw, "POST_VIEW"), (recovery.draw_touching, "POST_VIEW")),
+    *((landmark_tools.draw, "POST_PIXEL"), (drawing.draw_label, "POST_PIXEL")),
     (first_run.draw, "POST_PIXEL"),
 )
 PARTS = (  # what begins with the extension, and how it ends
@@ -147,7 +146,7 @@ PARTS = (  # what begins with the extension, and how it ends
 STATE = (job_operator.runs, jobs.board, display, sessions.live, held_counts.pending, source_surface.changed)
 STATE += (motion.written, carrying.written, hover, prefetch, applying.solved, overlays.shown)
 STATE += (solve_job.steps, empties.seen_active, host, style_settings.style_cache, left_behind.seen)
-STATE += (stored.shapes, applied_transforms.seen, applied_transforms.followed, status, symmetry.planes)
+STATE += (live_modifier.shapes, applied_transforms.seen, applied_transforms.followed, status, symmetry.planes)
 STATE += (first_run.welcome, landmarks.nearest)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread

@@ -19,8 +19,8 @@ from ..carried import points
 from ..core.errors import UserError, as_user_error
 from ..core.runtime import native
 from ..core.runtime.jobs import Pause
-from ..field_modifier import cache_modifier, inputs
-from ..results import result_objects
+from ..field_modifier import cache_modifier, node_group
+from ..results import placement
 
 # Stores for the frames of a bake, cache files or shape keys, and their sizes.
 
@@ -55,7 +55,7 @@ class ShapeKeys:
         for number, frame in enumerate(names):
             text = translated("Storing frame {frame}", frame=frame)
             job.report_main_thread(number / len(names), text)
-            result_objects.add_frame(self.item, names, number, self.shapes[number])
+            placement.add_frame(self.item, names, number, self.shapes[number])
             self.shapes[number] = None  # stored in the key
             yield Pause.REDRAW
 
@@ -68,7 +68,7 @@ class ShapeKeys:
         """Removes the temporary object with its mesh; on the main thread."""
         if self.item is not None:
             with contextlib.suppress(ReferenceError):  # another file was loaded
-                result_objects.discard(self.item)
+                placement.discard(self.item)
 
 
 class OutputFolder:
@@ -201,7 +201,7 @@ def plays(item, path):
     """Whether an object plays the cache at that path."""
     played = points.find(item)
     if played is not None:
-        item = inputs.get(played, "Points") or item
+        item = node_group.get(played, "Points") or item
     return any(
         one.type == "MESH_CACHE" and same_place(file_of(one, item)) == same_place(path)
         for one in item.modifiers

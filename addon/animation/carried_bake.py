@@ -11,7 +11,7 @@ import contextlib
 import bpy
 
 from ..blender import modifier_stack, references
-from ..blender.actions import key_at
+from ..blender.evaluation import key_at
 from ..blender.language import translated
 from ..carried import points
 from ..carried.carriers import MeshCarrier
@@ -30,7 +30,7 @@ from ..carried.transforms import BAKED_GROUP, BonesCarrier, PoseCarrier, Transfo
 from ..core.errors import UserError, as_user_error
 from ..core.runtime.jobs import Pause
 from ..field_modifier import cache_modifier
-from ..results import placement, result_objects
+from ..results import placement
 from ..solver.frame_range import playing
 from .caches import CacheFile, plain
 
@@ -162,15 +162,15 @@ class CarriedBake:
         self.caches[carried].play_on(item)
 
     def add_object(self, context, carried, item):
-        mesh = result_objects.shown_mesh(context, item, len(self.shapes[carried][0]), in_place=True)
+        mesh = placement.shown_mesh(context, item, len(self.shapes[carried][0]), in_place=True)
         report = {"frames": self.frames.count}
-        baked = result_objects.show(context, item, "BAKE", "BAKE", mesh, report, select=False)
+        baked = placement.show(context, item, "BAKE", "BAKE", mesh, report, select=False)
         partial = references.copy_modifiers(baked, modifier_stack.behind(item))
         if partial:
             names = ", ".join(partial)
             self.warnings.append(UserError("{name}: bind or comb {modifiers} again", baked, modifiers=names))
         source = self.carrying.source.get()
-        own = {source: result_objects.existing(context, source, "BAKE", "BAKE")}
+        own = {source: placement.existing(context, source, "BAKE", "BAKE")}
         references.remap(references.parts_of(baked), own)
         yield from self.add_frames(carried, baked)
         placement.show_alone(item, baked)
@@ -178,7 +178,7 @@ class CarriedBake:
     def add_frames(self, carried, item):
         frames = [plain(frame) for frame in self.frames]
         for number, shape in enumerate(self.shapes[carried]):
-            result_objects.add_frame(item, frames, number, shape)
+            placement.add_frame(item, frames, number, shape)
             yield Pause.REDRAW
 
     def add_keys(self, carried, item):

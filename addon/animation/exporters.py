@@ -11,20 +11,19 @@ import numpy as np
 from mathutils import Matrix
 
 from ..blender import mesh_arrays
-from ..blender.actions import curves_of
-from ..blender.evaluation import updated
+from ..blender.evaluation import curves_of, updated
 from ..blender.host import has_window
 from ..blender.language import about, translated
 from ..blender.object_references import ObjectReference, settings_of, source_of
 from ..blender.property_definitions import choice, path_text, text
 from ..blender.splat_layouts import holds_splats
-from ..core import file_checks
+from ..core import files
 from ..core.errors import UserError
 from ..core.runtime.jobs import Item, Pause
 from ..core.settings.choices import EXPORT_FORMATS
 from ..field_modifier import cache_modifier
 from ..names import CONTEXT, Op
-from ..results import result_objects
+from ..results import placement
 from ..solver import frame_range
 from ..solver.frame_range import playing
 from . import caches
@@ -73,7 +72,7 @@ def write(context, kind, path, items, frames):
                 raise UserError(
                     "{path}: Blender cannot write it ({reason})", path=path, reason=reason
                 ) from error
-        if not file_checks.is_whole_animation(partial, kind):
+        if not files.is_whole_animation(partial, kind):
             raise UserError("{path}: Blender could not write all of it; the disk may be full", path=path)
 
 
@@ -165,7 +164,7 @@ class MorphingCopy:
                 evaluated, preserve_all_data_layers=True, depsgraph=depsgraph
             )
             self.item = bpy.data.objects.new(self.source.name, mesh)
-            result_objects.look_like(self.source, self.item)
+            placement.look_like(self.source, self.item)
             self.context.scene.collection.objects.link(self.item)
             self.item.matrix_world = self.world = world
             points = mesh_arrays.positions(mesh)
@@ -399,9 +398,9 @@ class ARAPFIELDS_OT_export_animation(BakeOperator, bpy.types.Operator):
         else:
             player = bpy.data.objects.new(f"{source.name}_baked", bake.mesh(context, source))
             context.scene.collection.objects.link(player)
-            stack.callback(result_objects.discard, player)
-            result_objects.look_like(source, player)
-            result_objects.place(context, source, player)
+            stack.callback(placement.discard, player)
+            placement.look_like(source, player)
+            placement.place(context, source, player)
         bake.store.play_on(player)
         return player
 

@@ -10,14 +10,14 @@ from dataclasses import replace
 import numpy as np
 
 from ..blender import mesh_arrays
-from ..blender.actions import varies
+from ..blender.evaluation import varies
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..core.errors import UserError, as_user_error
 from ..field_modifier import layers
 from ..handles import empties
 from ..live import sessions
-from ..results import placement, result_objects
+from ..results import placement
 from ..solver import contact, secondary_motion
 from ..solver.frame_solver import FrameSolver, sampled
 from ..solver.secondary_motion import Moment, Poses, Simulation
@@ -310,12 +310,12 @@ class ObjectBake:
         """The mesh of a new object, for a bake that does not play on the source itself."""
         solver = self.solver
         if solver.sampled.topology is not None:
-            return result_objects.surface_mesh(source, solver.to_local(solver.rest), solver.sampled.topology)
-        return result_objects.shown_mesh(context, source, len(solver.rest))
+            return placement.surface_mesh(source, solver.to_local(solver.rest), solver.sampled.topology)
+        return placement.shown_mesh(context, source, len(solver.rest))
 
     def new_object(self, context, source, mesh):
         report = {"frames": self.frames.count}
-        return result_objects.show(context, source, "BAKE", "BAKE", mesh, report)
+        return placement.show(context, source, "BAKE", "BAKE", mesh, report)
 
     def place_keys(self, context, source):
         item = self.new_object(context, source, self.store.item.data)

@@ -14,7 +14,7 @@ from ..carried.carriers import MeshCarrier
 from ..carried.carrying import carrier_class
 from ..carried.points import AttributeCarrier
 from ..core.errors import UserError, refuse
-from ..field_modifier import cache_modifier, field_nodes, inputs
+from ..field_modifier import cache_modifier, field_nodes, node_group
 from ..live import sessions
 from ..names import FIELD_NODES
 from ..poses import applying
@@ -240,7 +240,7 @@ def follow(item, carrier):
     index = modifier_stack.end(list(item.modifiers))
     modifier = item.modifiers.new("ARAP Field", "NODES")
     modifier.node_group = field_nodes.find_or_make()
-    inputs.put(modifier, "Field", carrier)
+    node_group.put(modifier, "Field", carrier)
     item.modifiers.move(item.modifiers.find(modifier.name), index)
 
 
@@ -248,7 +248,7 @@ def is_following(modifier, carrier):
     return (
         modifier.type == "NODES"
         and FIELD_NODES in (modifier.node_group or ())
-        and inputs.get(modifier, "Field") == carrier
+        and node_group.get(modifier, "Field") == carrier
     )
 
 

@@ -5,7 +5,7 @@ import math
 
 import bpy
 
-from .actions import curves_of
+from .evaluation import curves_of
 from .object_references import settings_of
 
 # Settings by group, with the values that were the defaults of version 0, 1, …

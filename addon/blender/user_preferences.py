@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 from bl_operators.presets import AddPresetBase
 
-from ..core.runtime.fit_cache import FitCache
+from ..core.files import FitCache
 from ..core.settings.parameters import presets
 from ..names import PACKAGE, PROPERTY
 from .object_references import settings_of, source_of

@@ -13,7 +13,7 @@ from ..blender.object_references import ObjectReference, in_scene, settings_of
 from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import facing, inverse, transform, unflattened
-from ..field_modifier import field_nodes, inputs, motion
+from ..field_modifier import field_nodes, motion, node_group
 from .carriers import MeshCarrier
 from .points import AttributeCarrier, KeyCarrier
 from .rest_bones import above_field
@@ -351,7 +351,7 @@ class Carrying:
                     before.pop(uid, None)
                 self.before[uid] = before.get(uid) or (carried, carried.carrier.snapshot(item, entry))
                 carried.carrier.bind(context, item, entry)
-                inputs.lend_mask(source, item)
+                node_group.lend_mask(source, item)
             except (UserError, RuntimeError) as error:
                 self.leave(carried, error)
         if self.nodes is not None:

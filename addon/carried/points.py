@@ -5,10 +5,10 @@ import bpy
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack, references
-from ..blender.actions import remove_curves
+from ..blender.evaluation import remove_curves
 from ..blender.references import remove_mesh_object, remove_node_modifier
 from ..core.errors import UserError
-from ..field_modifier import cache_modifier, inputs, motion, node_group
+from ..field_modifier import cache_modifier, motion, node_group
 from ..field_modifier.node_group import VECTORS, Graph, kept_group
 from ..names import CACHE_MODIFIER, FIELD_MODIFIER, OFFSETS, PLAYED_GROUP, PLAYED_SUFFIX, ROWS, WARP_KEY
 from .carriers import Carrier
@@ -85,13 +85,13 @@ def play(item, points, counts):
     field = modifier_stack.find(item)
     modifier = item.modifiers.new(CACHE_MODIFIER, "NODES")
     modifier.node_group = find_or_make()
-    inputs.put(modifier, "Points", bpy.data.objects.new(name, mesh))
+    node_group.put(modifier, "Points", bpy.data.objects.new(name, mesh))
     if field is not None:
-        inputs.put_attribute(modifier, "Mask", inputs.get_attribute(field, "Mask"))
-        inputs.put(modifier, "Factor", inputs.get(field, "Factor"))
+        node_group.put_attribute(modifier, "Mask", node_group.get_attribute(field, "Mask"))
+        node_group.put(modifier, "Factor", node_group.get(field, "Factor"))
     item.modifiers.move(len(item.modifiers) - 1, 0)  # hair grown from these follows
     cache_modifier.set_playing(item, True, find(item))
-    return inputs.get(modifier, "Points")
+    return node_group.get(modifier, "Points")
 
 
 def remove(item):
@@ -100,7 +100,7 @@ def remove(item):
     if modifier is None:
         return
     cache_modifier.set_playing(item, False, modifier)
-    played = inputs.get(modifier, "Points")
+    played = node_group.get(modifier, "Points")
     remove_node_modifier(modifier)
     if played is not None and played.users == 0:
         remove_mesh_object(played)

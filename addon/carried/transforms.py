@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from mathutils import Euler, Matrix, Quaternion, Vector
 
-from ..blender.actions import remove_curves
-from ..blender.evaluation import with_ancestors
+from ..blender.evaluation import remove_curves, with_ancestors
 from ..core.errors import UserError
 from ..core.geometry import spaces
 from ..core.geometry.spaces import inverse, transform, unflattened

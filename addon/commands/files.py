@@ -15,7 +15,7 @@ import numpy as np
 from ..blender import mesh_arrays
 from ..blender.object_references import is_source
 from ..core.errors import UserError
-from ..core.file_checks import are_whole_meshes
+from ..core.files import are_whole_meshes
 from .parser import FORMATS
 
 NOTICED = 1e-6  # share of a mesh's size: a loss from single precision of which users are told

@@ -7,10 +7,10 @@ While it plays, the field's modifier is disabled; a new motion of the object ena
 import bpy
 
 from ..blender import modifier_stack
-from ..blender.actions import pace
+from ..blender.evaluation import pace
 from ..blender.object_references import settings_of
 from ..names import CACHE_MODIFIER
-from . import inputs
+from . import node_group
 
 
 def play(source, path, start, step):
@@ -37,8 +37,8 @@ def add(source):
     settings_of(source).bake.uid = modifier.persistent_uid
     if field is not None:
         index += 1
-        modifier.factor = inputs.get(field, "Factor")
-    group = inputs.mask_of(source)
+        modifier.factor = node_group.get(field, "Factor")
+    group = node_group.mask_of(source)
     modifier.vertex_group = group if group in source.vertex_groups else ""
     source.modifiers.move(source.modifiers.find(modifier.name), index)
     return source.modifiers[index]

@@ -8,14 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack, references
-from ..blender.actions import varies
+from ..blender.evaluation import varies
 from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError
 from ..core.runtime import jobs
 from ..names import FIELD_MODIFIER, LAYER_GROUP
-from . import cache_modifier, inputs, motion, node_group
+from . import cache_modifier, motion, node_group
 
 # Checks whether the user has disabled the field's modifier, or something does not follow it.
 
@@ -42,7 +42,7 @@ def unmoved_modifiers(source):
 
 
 def modifier_off(source, modifier):
-    if modifier.show_viewport and inputs.get(modifier, "Factor") != 0.0:
+    if modifier.show_viewport and node_group.get(modifier, "Factor") != 0.0:
         return []
     if varies(source, f'modifiers["{modifier.name}"]'):
         return []
@@ -133,7 +133,7 @@ def make_way(source, kind):
         if ORDER[kind_in(layer)] < ORDER[kind]:
             break
         field, by = modifier_stack.find(source), settings_of(source).moved_by
-        gone.append(field and (motion.snapshot(source), by, inputs.get(field, "Factor")))
+        gone.append(field and (motion.snapshot(source), by, node_group.get(field, "Factor")))
         with references.unused_kept():  # put_back() may take them again, without a step of undo
             motion.discard(source)
             uncover(source, baked=True)
@@ -162,7 +162,7 @@ def put_back(context, source, way):
         if one is not None:
             moved, by, factor = one
             with contextlib.suppress(UserError):  # the mesh has changed
-                inputs.put(motion.bind(context, source), "Factor", factor)
+                node_group.put(motion.bind(context, source), "Factor", factor)
                 if moved.offsets is not None:  # an undo may have emptied what held them
                     motion.write(source, moved)
                 settings_of(source).moved_by = by
@@ -189,7 +189,7 @@ def offset_at(source, index):
         number = "" if modifier_stack.is_field(modifier) else parts(modifier)[1]
         offsets = motion.carrier(source, modifier).attributes.get(node_group.names_of(number)[0])
         if modifier.show_viewport and offsets is not None and index < len(offsets.data):
-            moved += inputs.get(modifier, "Factor") * np.array(offsets.data[index].vector)
+            moved += node_group.get(modifier, "Factor") * np.array(offsets.data[index].vector)
     return moved
 
 

@@ -13,7 +13,7 @@ from ..blender.point_data import points_of
 from ..blender.references import remove_mesh_object, remove_node_modifier, remove_unused_group
 from ..core.errors import UserError
 from ..names import FIELD_MODIFIER, HELPER_SUFFIX, OFFSETS, SHAPE_OF
-from . import cache_modifier, inputs, node_group
+from . import cache_modifier, node_group
 
 
 def silence_armatures(source):
@@ -103,7 +103,7 @@ def bind(context, source, expected=None, live=False):
         modifier = add(source, normals, splats)
     else:
         choose_group(modifier, normals, splats)
-    inputs.take_mask(source)
+    node_group.take_mask(source)
     earlier, moved = carrier(source, modifier), snapshot(source)
     if live or not on_mesh:
         take_helper(source, modifier)
@@ -145,19 +145,19 @@ def take_group(modifier, group):
     """Replaces the node group of a field modifier; keeps the user's inputs."""
     if modifier.node_group == group:
         return
-    factor, mask = inputs.get(modifier, "Factor"), inputs.get(modifier, "Mask")
-    masked, helper = inputs.get_attribute(modifier, "Mask"), inputs.get(modifier, "Offsets")
+    factor, mask = node_group.get(modifier, "Factor"), node_group.get(modifier, "Mask")
+    masked, helper = node_group.get_attribute(modifier, "Mask"), node_group.get(modifier, "Offsets")
     old, modifier.node_group = modifier.node_group, group
     remove_unused_group(old)
     for name, value in (("Factor", factor), ("Mask", mask), ("Offsets", helper)):
-        inputs.put(modifier, name, value)
-    inputs.put_attribute(modifier, "Mask", masked)
+        node_group.put(modifier, name, value)
+    node_group.put_attribute(modifier, "Mask", masked)
 
 
 def take_helper(source, modifier):
     """Gives the modifier a helper of its own, unless it has one; between two steps of undo also one that it
     shares with a duplicate will do. Returns it."""
-    helper = inputs.get(modifier, "Offsets")
+    helper = node_group.get(modifier, "Offsets")
     if helper is not None and helper.library is None and (users_of(helper) == 1 or references.is_between):
         return helper
     own = unused_helper(source)
@@ -168,14 +168,14 @@ def take_helper(source, modifier):
     if helper is not None:
         mesh_arrays.take_geometry(own.data, helper.data)
         write_to(own.data, read_from(helper.data))
-    inputs.put(modifier, "Offsets", own)
+    node_group.put(modifier, "Offsets", own)
     return own
 
 
 def fill_helper(context, source, modifier):
     """Gives the helper the vertices and faces at the modifier's place."""
     shown = modifier_stack.mesh_copy(context, source, in_place=True)
-    mesh = inputs.get(modifier, "Offsets").data
+    mesh = node_group.get(modifier, "Offsets").data
     try:
         mesh_arrays.take_geometry(mesh, shown)
     finally:
@@ -186,16 +186,16 @@ def fill_helper(context, source, modifier):
 
 def leave_helper(modifier, live=False):
     """Empties the helper, or one that is a duplicate's too is no longer the modifier's; `live`: it stays."""
-    helper = inputs.get(modifier, "Offsets")
+    helper = node_group.get(modifier, "Offsets")
     if helper is None:
         return
     if users_of(helper) > 1 or helper.library is not None:
         if len(helper.data.vertices):
-            inputs.put(modifier, "Offsets", None)
+            node_group.put(modifier, "Offsets", None)
     elif live or references.keeps_unused:
         empty(helper)
     else:
-        inputs.put(modifier, "Offsets", None)
+        node_group.put(modifier, "Offsets", None)
         discard_helper(helper)
 
 
@@ -238,7 +238,7 @@ def discard_helper(helper):
 
 def carrier(source, modifier):
     """The mesh that stores the offsets: the helper's unless that is empty."""
-    helper = inputs.get(modifier, "Offsets")
+    helper = node_group.get(modifier, "Offsets")
     return source.data if helper is None or not len(helper.data.vertices) else helper.data
 
 
@@ -319,7 +319,7 @@ def discard(source):
     """Removes the modifier once the mesh contains its motion."""
     modifier = modifier_stack.find(source)
     if modifier is not None:
-        helper = inputs.get(modifier, "Offsets")
+        helper = node_group.get(modifier, "Offsets")
         remove_node_modifier(modifier)
         if helper is not None:
             discard_helper(helper)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What shows a live shape: the source's modifier, or an object of its own."""
+"""What shows a live shape, its marks in the file, and the shapes that are kept for undo."""
 
+import hashlib
 from typing import Any, NamedTuple
 
 import bpy
@@ -8,11 +9,113 @@ import numpy as np
 
 from ..blender import mesh_arrays, modifier_stack, references
 from ..blender.object_references import ObjectReference, in_scene, settings_of
+from ..blender.point_data import points_of
 from ..core.errors import UserError
-from ..field_modifier import cache_modifier, motion
+from ..field_modifier import cache_modifier, field_nodes, motion
 from ..field_modifier.layers import Way
-from ..results import placement, result_objects
-from . import stored
+from ..names import SHAPE_OF
+from ..results import placement
+
+# Marks for the pose that a live source's shape belongs to, and a cache of shown shapes for undo.
+#
+# Undo does not restore a mesh that both undo steps share, even if live mode has written to it since. So a
+# mark on the mesh names the pose of its shape, and the object's `held` the shape that replaces a pose's
+# own.
+
+UNSETTLED = "?"  # the mark of a shape whose solve has not ended
+MOST, LARGEST = 1000, 1 << 28  # size of the cache: items, and bytes of their arrays
+
+
+class Kept(dict):
+    """Cache {key: item} that drops the items that were kept first.
+
+
+    `arrays_of(item)` are its arrays, or None; items may share them.
+    """
+
+    def __init__(self, arrays_of):
+        self._arrays_of = arrays_of
+
+    def keep(self, key, item):
+        self.pop(key, None)
+        self[key] = item
+        while len(self) > MOST or self._size() > LARGEST:
+            del self[next(iter(self))]
+
+    def _size(self):
+        arrays = {id(one): one for item in self.values() for one in self._arrays_of(item) if one is not None}
+        return sum(one.nbytes for one in arrays.values())
+
+
+def arrays_of(shape):
+    return () if shape is None else (shape.offsets, shape.turns, *(shape.changes or {}).values())
+
+
+shapes = Kept(arrays_of)  # {mark: Motion}
+
+
+def mark(source):
+    """The mark of the source's motion; "" if live mode did not write it."""
+    modifier = modifier_stack.find(source)
+    return "" if modifier is None else motion.carrier(source, modifier).get(SHAPE_OF, "")
+
+
+def put_mark(source, key):
+    modifier, nodes = modifier_stack.find(source), field_nodes.of(source)
+    meshes = [motion.carrier(source, modifier)] if modifier is not None else []
+    for mesh in [*meshes, *([nodes.data] if nodes is not None else [])]:
+        if mesh.get(SHAPE_OF, "") == key:
+            continue
+        if key:
+            mesh[SHAPE_OF] = key
+        else:
+            del mesh[SHAPE_OF]
+
+
+def note(source, key, shape):
+    """Marks the source with the digest of the request whose shape is on display; "": of none yet."""
+    put_mark(source, key or UNSETTLED)
+    if key:
+        shapes.keep(key, motion.Motion(shape.points - shape.rest, shape.turns, shape.changes))
+
+
+def hold(source, pose):
+    """Makes the source's present shape that of a pose, given by its digest."""
+    shape = motion.snapshot(source)
+    if shape is None:
+        return
+    offsets = b"" if shape.offsets is None else shape.offsets.tobytes()
+    key = f"{pose} {hashlib.sha1(offsets).hexdigest()}"
+    settings_of(source).held = key
+    put_mark(source, key)
+    shapes.keep(key, shape)
+
+
+def wanted(source, pose):
+    """The mark of a pose's shape: of the one that is held for it, or the pose's digest."""
+    held = settings_of(source).held
+    return held if held.startswith(f"{pose} ") else pose
+
+
+def recall(source, pose):
+    """Shows a pose's shape again, bit for bit, from the mesh or the cache; False if neither has it."""
+    key, nodes = wanted(source, pose), field_nodes.of(source)
+    if nodes is not None and nodes.data.get(SHAPE_OF) != key:
+        return False
+    if mark(source) != key:
+        shape, modifier = shapes.get(key), modifier_stack.find(source)
+        if shape is None or modifier is None:
+            return False
+        count = len(points_of(motion.carrier(source, modifier)))
+        if settings_of(source).carried or (shape.offsets is not None and len(shape.offsets) != count):
+            return False
+        motion.restore(source, shape)
+        motion.written.add(source.session_uid)
+        put_mark(source, key)
+    return True
+
+
+# What shows a live shape: the source's modifier, or an object of its own.
 
 # A live shape that is an object of its own: a surface, or the copy that the user wants as the result.
 
@@ -26,9 +129,9 @@ class LiveObject:
 
     def __init__(self, context, source, surface):
         references.refuse_new(source)
-        mesh = result_objects.shown_mesh(context, source, len(surface.local))
+        mesh = placement.shown_mesh(context, source, len(surface.local))
         active, selected = context.view_layer.objects.active, list(context.selected_objects)
-        item = result_objects.show(context, source, LIVE, LIVE, mesh, {"output": LIVE}, select=False)
+        item = placement.show(context, source, LIVE, LIVE, mesh, {"output": LIVE}, select=False)
         placement.show_alone(source, item, for_now=True)
         context.view_layer.objects.active = active
         for other in selected:
@@ -72,7 +175,7 @@ class LiveObject:
             forget(source)
         leftover = self.result.find()
         if leftover is not None:
-            result_objects.discard(leftover)
+            placement.discard(leftover)
 
     def keep(self, context, source, kind):
         """Replaces the live object by a result of that kind with the same mesh; returns the result."""
@@ -82,7 +185,7 @@ class LiveObject:
         forget(source)
         mesh = item.data
         bpy.data.objects.remove(item)
-        item = result_objects.show(context, source, kind, settings_of(source).output, mesh, {"output": LIVE})
+        item = placement.show(context, source, kind, settings_of(source).output, mesh, {"output": LIVE})
         placement.show_alone(source, item)
         return item
 
@@ -132,7 +235,7 @@ class LiveModifier:
 
     @property
     def arrays(self):
-        return (*stored.arrays_of(self.before), *stored.arrays_of(self.first))
+        return (*arrays_of(self.before), *arrays_of(self.first))
 
     def require(self, source):
         """Raises UserError if the user has removed or applied the modifier."""
@@ -155,7 +258,7 @@ class LiveModifier:
         """Restores the motion from before live mode, if any."""
         if source is not None:
             settings_of(source).live_kind = ""
-            stored.put_mark(source, "")
+            put_mark(source, "")
             placement.give_back(source)
             if source.mode != "EDIT":
                 motion.restore(source, self.before)
@@ -171,7 +274,7 @@ class LiveModifier:
         returns the source."""
         settings = settings_of(source)
         settings.live_kind = ""
-        stored.put_mark(source, "")
+        put_mark(source, "")
         motion.drop_empty_helper(source)
         placement.keep_visibility(source)
         result, shape = settings.result, self.shown
@@ -183,9 +286,9 @@ class LiveModifier:
 
     def leave(self, source):
         """After undo to a step without live mode: restores `first` if the mesh still has a live shape."""
-        if stored.mark(source):
+        if mark(source):
             motion.restore(source, self.first)
-            stored.put_mark(source, "")
+            put_mark(source, "")
 
 
 PAUSING = ("EDIT", "SCULPT")  # modes in which the user changes the mesh

@@ -15,7 +15,7 @@ from ..blender.section import (
     settings_column,
     switched,
 )
-from ..field_modifier import inputs, layers
+from ..field_modifier import layers, node_group
 from ..names import Op
 from ..solver import secondary_motion
 from ..solver.frame_range import scene_range
@@ -59,11 +59,11 @@ def result_row(layout, source, kind):
     if modifier is None:
         return
     row = layout.row(align=True)
-    socket = inputs.slot(modifier, "Factor")
+    socket = node_group.slot(modifier, "Factor")
     if socket is not None:
         row.prop(socket, "value", text="Factor", slider=True)
     else:
-        row.prop(modifier, f'["{inputs.identifier(modifier, "Factor")}"]', text="Factor", slider=True)
+        row.prop(modifier, f'["{node_group.identifier(modifier, "Factor")}"]', text="Factor", slider=True)
     if kind != "DEFORM":  # beside its button
         remove_button(row, source, kind)
 

@@ -17,10 +17,10 @@ from ..core.runtime import jobs
 from ..field_modifier import motion
 from ..handles import empties, movers
 from ..names import RESULT_SUFFIX
-from ..results import placement, result_objects
+from ..results import placement
 from ..solver.contact import obstacles_of
 from ..solver.source_reader import SourceChanged
-from . import live_modifier, sessions, stored
+from . import live_modifier, sessions
 from .playback import scene_frame
 from .sessions import WAIT, end_with_error, is_live, live, poll_live, take_away
 
@@ -80,7 +80,7 @@ def bring_back(source):
     if former is not None and former.uid != source.session_uid:
         return forget_copy(source)
     if former is None or not former.display.is_there():
-        stored.put_mark(source, "")
+        live_modifier.put_mark(source, "")
         return discard_live_object(source)
     live.past.keep(number, former)
     live.returning[source.session_uid] = former
@@ -110,7 +110,7 @@ def forget_copy(item):
     """Ends a duplicate's live state; the shape that it shows stays."""
     placement.keep_visibility(item)
     if item.data.users == 1:
-        stored.put_mark(item, "")
+        live_modifier.put_mark(item, "")
     live_modifier.forget_result(item)
 
 
@@ -118,7 +118,7 @@ def discard_live_object(source):
     """Ends the live state and removes the live object, if any; the modifier stays as the undo step has it."""
     item = live_modifier.forget(source)
     if item is not None:
-        result_objects.discard(item)
+        placement.discard(item)
 
 
 def adopt(source):
@@ -129,11 +129,11 @@ def adopt(source):
         discard_live_object(source)
         return
     placement.keep_visibility(source)
-    stored.put_mark(source, "")
+    live_modifier.put_mark(source, "")
     if item is not None:
         live_modifier.forget(source)
         item.name = item.data.name = f"{source.name}{RESULT_SUFFIX[kind]}"
-        result_objects.register(source, kind, settings.output, item)
+        placement.register(source, kind, settings.output, item)
     elif not in_scene(source) or not is_moved(source):
         return
     text = translated("it was live when the file was saved; its shape is kept as a result")

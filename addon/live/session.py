@@ -26,7 +26,7 @@ from ..solver.frame_range import animation_range
 from ..solver.frame_solver import Request, Shape
 from ..solver.source_reader import SourceChanged, SourceReader, rest_frame, solve_space, uses_handles
 from ..stiffness import painted
-from . import stored
+from . import live_modifier
 from .live_modifier import PAUSING, Former, display_of
 from .live_solver import PACE, LiveSolver
 from .playback import Playback, scene_frame
@@ -203,7 +203,7 @@ class Session:
         self.number = next(numbers)
         settings.live_kind, settings.live_number = kind, self.number
         if earlier is None and self.display.in_place:
-            stored.put_mark(source, stored.UNSETTLED)
+            live_modifier.put_mark(source, live_modifier.UNSETTLED)
             self.carrying.warnings += layers.reasons_unseen(source)
         self._reading = self._start(context)
 
@@ -302,9 +302,9 @@ class Session:
         if not self.display.in_place:
             return False
         if self.is_held:
-            stored.hold(source, self.digest(request))
+            live_modifier.hold(source, self.digest(request))
         self.is_held = False
-        return stored.recall(source, self.digest(request))
+        return live_modifier.recall(source, self.digest(request))
 
     def digest(self, request):
         """Hash of a request and the setup; equal for requests of the same shape."""
@@ -320,14 +320,14 @@ class Session:
         context.view_layer.update()
         source = self.source.get()
         if self.waits(source):
-            return stored.mark(source) != stored.UNSETTLED
+            return live_modifier.mark(source) != live_modifier.UNSETTLED
         if self.is_restored:
             return False
         try:
             now = self.digest(self.reader.request(context))
         except SourceChanged:
             return False
-        return stored.mark(source) == stored.wanted(source, now)
+        return live_modifier.mark(source) == live_modifier.wanted(source, now)
 
     def keep_shown(self):
         """With `keeps_shape`, makes the shape on display the one that stays when live mode ends."""
@@ -359,7 +359,7 @@ class Session:
         if known is None:
             return False
         if known.shape is None:
-            return self.display.in_place and stored.recall(source, self.digest(request))
+            return self.display.in_place and live_modifier.recall(source, self.digest(request))
         return self.show_shape(source, known.shape)
 
     def restored(self, is_held=False):
@@ -380,7 +380,7 @@ class Session:
             return
         source = self.source.get()
         if self.is_quiet:
-            if shape.of is not None and stored.mark(source) == self.digest(shape.of):
+            if shape.of is not None and live_modifier.mark(source) == self.digest(shape.of):
                 self.touching = shape.touching
                 redraw(bpy.context, "WINDOW")
         else:
@@ -393,7 +393,7 @@ class Session:
         self.touching = shape.touching
         self.carrying.show(shape.carried)
         if self.display.in_place:
-            stored.note(source, "" if shape.of is None else self.digest(shape.of), shape)
+            live_modifier.note(source, "" if shape.of is None else self.digest(shape.of), shape)
         if shape.of is not None and all(one.shape is not shape for one in self.at_rest):
             self.at_rest.append(AtRest(shape.of, shape))
         return True

@@ -20,9 +20,9 @@ from ..field_modifier import layers
 from ..results import placement
 from ..solver.frame_range import involved
 from ..solver.source_reader import SourceChanged, uses_handles
+from .live_modifier import Kept
 from .playback import scene_frame
 from .session import Session, Updates
-from .stored import Kept
 
 
 class ShownScene:

@@ -8,7 +8,7 @@ from ..blender.language import translated
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.runtime import jobs
 from ..field_modifier import layers, motion
-from ..live import sessions, stored
+from ..live import live_modifier, sessions
 from . import pins
 
 SHAPE_WAIT = 0.25  # most seconds that a redraw waits for the shape
@@ -23,7 +23,7 @@ class Snapshot:
         settings, layer = settings_of(source), context.view_layer
         self.source, session = ObjectReference(source), sessions.live.get(source.session_uid)
         self.live = None if session is None else (session.kind, session.keeps_shape)
-        self.mark = stored.mark(source)
+        self.mark = live_modifier.mark(source)
         self.is_settled = session is None or session.is_current(context)
         self.motion = motion.snapshot(source)
         self.row = settings.active_handle
@@ -48,7 +48,7 @@ class Snapshot:
             motion.write_to(motion.carrier(source, modifier), motion.Motion(None))
         else:
             motion.restore(source, self.motion)
-        stored.put_mark(source, self.mark)
+        live_modifier.put_mark(source, self.mark)
         if sessions.is_live(source):  # else it has ended with an error, shown in the panel
             sessions.live[source.session_uid].restored(is_held)
             sessions.update(context)

@@ -14,7 +14,7 @@ from ..core.runtime import native
 from ..live import sessions
 from ..live.live_solver import prefetch
 from ..names import TOOL
-from . import drag, hints, pins, screen
+from . import drag, drawing, pins, screen
 from .hover import View, hover, under
 
 # Mixins of the pin tool's operators: their poll, and the modal drag from press to settled shape.
@@ -58,7 +58,7 @@ class Dragging(PinOperator):
         hover.drag = dragged
         self.grab(view, view.pixel)
         context.window_manager.modal_handler_add(self)
-        hints.refresh()
+        drawing.refresh()
         redraw(context, "WINDOW", "UI")
         return {"RUNNING_MODAL"}
 
@@ -138,7 +138,7 @@ class Dragging(PinOperator):
             self.timer = None
         if hover.drag is self.drag:
             hover.clear()
-        hints.refresh()
+        drawing.refresh()
         redraw(context, "WINDOW", "UI")
         return result
 
@@ -195,8 +195,8 @@ class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
             before = hover.target or hover.missed
             hover.target, hover.missed = under(context, view, lights=True, other=event.alt), None
             hover.pixel, hover.region = view.pixel, context.region.as_pointer()
-            hover.label = "" if hover.target is None else hints.label(hover.target)
-            hints.refresh()
+            hover.label = "" if hover.target is None else drawing.label(hover.target)
+            drawing.refresh()
             if before is not None or hover.target is not None:
                 context.region.tag_redraw()
             source = hover.target.source.find() if hover.target is not None else None
@@ -218,7 +218,7 @@ class ARAPFIELDS_OT_pin_drag(Dragging, bpy.types.Operator):
         if target is None:
             return self.miss(context, view)
         if target.kind == "OTHER":
-            self.report({"INFO"}, hints.label(target))
+            self.report({"INFO"}, drawing.label(target))
             return {"CANCELLED"}
         try:
             source = source_of_target(target)
@@ -251,7 +251,7 @@ class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
         if target is None:
             return {"PASS_THROUGH"}
         if target.kind == "OTHER":
-            self.report({"INFO"}, hints.label(target))
+            self.report({"INFO"}, drawing.label(target))
             return {"CANCELLED"}
         try:
             source = source_of_target(target)

@@ -1,24 +1,125 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pins: handles with an Empty on the surface, each of which holds a small round region of it."""
+"""Pins: where they are on the surface and what their balls hold, placed, found and discarded."""
+
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Matrix, Vector
+from mathutils.geometry import barycentric_transform, closest_point_on_tri
 
-from ..blender import modifier_stack, object_references
+from ..blender import mesh_arrays, modifier_stack, object_references, point_data
 from ..blender.language import translated
 from ..blender.object_references import owner_of, settings_of
 from ..blender.property_definitions import listeners
 from ..carried import carrying
 from ..core.errors import UserError
+from ..core.geometry.edges import connected
 from ..core.geometry.handles import box_matrix
-from ..core.geometry.spaces import inverse
+from ..core.geometry.spaces import best_rotation, inverse, transform
 from ..core.runtime import jobs
 from ..field_modifier import layers, motion
 from ..handles import empties, movers
+from ..handles.empties import matrix_of
 from ..live import sessions
 from ..results import placement
-from . import places
+
+# Maps a point on the deformed surface to the rest shape, with the surface's rotation there.
+#
+# The field's modifier only moves points, so that the faces before and after it are the same.
+
+CANDIDATES = 64  # number of triangles to search if the face is unknown
+LEAST = 12  # least number of points to measure the rotation
+LEAST_OWN = 3  # vertices that tell how a place turns
+
+
+@dataclass(frozen=True)
+class Place:
+    rest: np.ndarray  # (3,) in world space, of the shape before the field
+    now: np.ndarray  # (3,) in world space, after the field
+    turn: np.ndarray  # (3, 3) rotation of the surface there since rest
+    size: float  # of the shape at rest, in the object's units
+    weights: dict  # {vertex group: mean weight of the points around it}
+
+
+def find(context, source, location, radius, face=None, face_count=None):
+    """The Place at a location on the shown surface, or of the splat nearest to it, (3,) in world space.
+
+    `face` is that of the shown mesh, which has `face_count` of them: where the mesh before the field has as
+    many, the place is looked for in that face alone.
+    """
+    world, rest = matrix_of(source), None
+    if modifier_stack.find(source) is not None:
+        with modifier_stack.evaluated_mesh(context, source, in_place=True) as still:
+            rest = transform(world, mesh_arrays.positions(still))
+    with modifier_stack.moved_mesh(context, source) as mesh:
+        now = transform(world, mesh_arrays.positions(mesh))
+        rest = now if rest is None else rest
+        faces = point_data.face_count(mesh)
+        if not len(now):
+            raise UserError("{name} has no vertices to hold a pin", source)
+        if not faces:
+            nearest = int(((now - location) ** 2).sum(axis=1).argmin())
+            at_rest, moved = rest[nearest], now[nearest]
+        else:
+            if face is not None and face_count == faces:
+                chosen = mesh_arrays.triangles_of(mesh, face)
+            else:
+                chosen = near(now, mesh_arrays.triangles(mesh), location)
+            at_rest, moved = map_back(now, rest, chosen, location)
+        about = around(rest, at_rest, radius)
+        if faces:
+            scale = 1 / max(radius, np.linalg.norm(rest[about] - at_rest, axis=1).max(), 1e-300)
+            ball = scale * (rest - at_rest)
+            own = connected(ball[about], ball, mesh_arrays.triangles(mesh))
+            about = about[own] if own.sum() >= LEAST_OWN else about
+        weights = group_weights(source, mesh, about)
+    size = float(np.linalg.norm(np.ptp(rest, axis=0)) / np.cbrt(abs(np.linalg.det(world[:3, :3])) or 1.0))
+    return Place(at_rest, moved, best_rotation(rest[about], now[about]), size, weights)
+
+
+def near(points, triangles, location):
+    """The CANDIDATES triangles whose centers are nearest to the location."""
+    away = ((points[triangles].mean(axis=1) - location) ** 2).sum(axis=1)
+    count = min(CANDIDATES, len(away))
+    return triangles[np.argpartition(away, count - 1)[:count]]
+
+
+def map_back(now, rest, triangles, location):
+    """((3,) rest position, (3,) position) of the point on these triangles nearest to the location."""
+    best, nearest, triangle = np.inf, Vector(location), triangles[0]
+    for corners in triangles:
+        point = closest_point_on_tri(Vector(location), *(Vector(now[i]) for i in corners))
+        away = (point - Vector(location)).length
+        if away < best:
+            best, nearest, triangle = away, point, corners
+    ends = [Vector(now[i]) for i in triangle], [Vector(rest[i]) for i in triangle]
+    mapped = np.array(barycentric_transform(nearest, *ends[0], *ends[1]))
+    if not np.isfinite(mapped).all():  # a degenerate triangle
+        closest = triangle[np.linalg.norm(now[triangle] - nearest, axis=1).argmin()]
+        mapped = rest[closest]
+    return mapped, np.array(nearest)
+
+
+def around(rest, place, radius):
+    """Indices of the points within the radius, or of the LEAST nearest ones if these are fewer."""
+    away = np.linalg.norm(rest - place, axis=1)
+    count = max(int((away <= radius).sum()), min(LEAST, len(rest)))
+    return np.argpartition(away, count - 1)[:count]
+
+
+def group_weights(source, mesh, indices):
+    """{vertex group: mean weight of these points of the mesh}."""
+    names = {group.index: group.name for group in source.vertex_groups}
+    sums = dict.fromkeys(names.values(), 0.0)
+    for index in indices.tolist() if names else ():
+        for entry in mesh.vertices[index].groups:
+            if entry.group in names:
+                sums[names[entry.group]] += entry.weight / len(indices)
+    return sums
+
+
+# Pins: handles with an Empty on the surface, each of which holds a small round region of it.
 
 REACH_STEP = 1.1  # factor of a handle's reach per step of the mouse wheel
 KEPT = 0.3  # distance from the pins beyond which points stay without Locality, as a share of the size
@@ -103,7 +204,7 @@ def place(context, source, location, radius, face=None, face_count=None, anchor=
         raise error
     is_first = not empties.used(source)
     with layers.way_for_handle(context, source):
-        place = places.find(context, source, location, radius, face, face_count)
+        place = find(context, source, location, radius, face, face_count)
     if face is not None and np.linalg.norm(place.now - location) > radius:
         warn_of_moves(source)
     if is_first:
@@ -140,7 +241,7 @@ def hold_turn(entry, holds):
     source, empty = entry.id_data, entry.empty
     if holds:
         location = np.array(empty.matrix_world.translation)
-        place = places.find(bpy.context, source, location, empty.empty_display_size)
+        place = find(bpy.context, source, location, empty.empty_display_size)
         empty.matrix_world = Matrix.LocRotScale(
             empty.matrix_world.translation, Matrix(place.turn.tolist()), empty.matrix_world.to_scale()
         )

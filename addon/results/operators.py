@@ -13,7 +13,7 @@ from ..field_modifier import layers, motion
 from ..jobs.job_operator import JobOperator
 from ..properties.choices import extraction, surface
 from ..surface.source_surface import read_surface
-from . import placement, result_objects
+from . import placement
 
 
 class FieldOperator(SourceOperator):
@@ -49,7 +49,7 @@ class ARAPFIELDS_OT_apply_as_shape_key(FieldOperator, bpy.types.Operator):
         placement.single_user(source)
         if source.data.shape_keys is None:
             source.shape_key_add(name="Basis", from_mix=False)
-        result_objects.add_warp_key(source, before, after)
+        placement.add_warp_key(source, before, after)
         motion.discard(source)
         layers.uncover(source)
 
@@ -87,8 +87,8 @@ class ARAPFIELDS_OT_extract(JobOperator, bpy.types.Operator):
         def apply(mesh):
             owner = shape.reference.get()
             report = {"resolution": grid["resolution"], "vertices": len(mesh[0]), "triangles": len(mesh[1])}
-            item = result_objects.show(
-                bpy.context, owner, "EXTRACT", "SURFACE", result_objects.surface_mesh(owner, *mesh), report
+            item = placement.show(
+                bpy.context, owner, "EXTRACT", "SURFACE", placement.surface_mesh(owner, *mesh), report
             )
             said = translated("{name} with {count} triangles", name=item.name, count=f"{len(mesh[1]):,}")
             return said + placement.hidden_note(placement.show_alone(owner, item))

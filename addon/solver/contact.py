@@ -8,8 +8,7 @@ import bpy
 import numpy as np
 
 from ..blender import mesh_arrays
-from ..blender.actions import has_keys
-from ..blender.evaluation import depsgraph_of
+from ..blender.evaluation import depsgraph_of, has_keys
 from ..blender.object_references import in_scene, settings_of
 from ..blender.property_definitions import from_single_precision
 from ..core.errors import UserError

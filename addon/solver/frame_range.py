@@ -8,7 +8,7 @@ from math import ceil, floor
 
 import bpy
 
-from ..blender.actions import pace
+from ..blender.evaluation import pace
 from ..blender.object_references import settings_of
 from ..blender.references import parts_of, references
 from ..core.errors import UserError

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..blender import actions, mesh_arrays, modifier_stack, user_preferences, vertex_groups
+from ..blender import evaluation, mesh_arrays, modifier_stack, user_preferences, vertex_groups
 from ..blender.evaluation import depsgraph_of, is_animated
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.point_data import shape_keys_of
@@ -154,7 +154,7 @@ def read_at_rest(context, source, kind, in_place, output=None, **further):
     """(the surface at rest, whether it is the current frame's). `further`: arguments of read_surface."""
     frame = rest_frame(source, kind, in_place, output)
     frame = None if frame == context.scene.frame_current else frame
-    with actions.kept(context, [] if frame is None else involved(source, kind)):
+    with evaluation.kept(context, [] if frame is None else involved(source, kind)):
         return read_surface(context, source, in_place, frame=frame, **further), frame is None
 
 

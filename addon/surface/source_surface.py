@@ -15,11 +15,11 @@ from ..blender.property_definitions import effective_values, options_of
 from ..blender.splat_layouts import Splats
 from ..blender.vertex_groups import NearestVertices
 from ..core.errors import UserError
+from ..core.files import fit_key
 from ..core.geometry import spaces
 from ..core.geometry.edges import build_edges, most_frequent
 from ..core.geometry.spaces import Space, space_of
 from ..core.runtime import native
-from ..core.runtime.fit_cache import fit_key
 from ..core.settings.parameters import FIT, QUALITIES, native_options
 from ..field_modifier import motion
 from ..handles import native_handles

@@ -5,8 +5,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..blender import mesh_arrays, modifier_stack, references
-from ..blender.actions import own_action, remove_curves
-from ..blender.evaluation import depsgraph_of, with_ancestors
+from ..blender.evaluation import depsgraph_of, own_action, remove_curves, with_ancestors
 from ..blender.object_references import in_scene, settings_of
 from ..carried import carrying
 from ..carried.carrying import carrier_class

@@ -13,7 +13,7 @@ from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import facing, inverse, transform
 from ..field_modifier import layers
 from ..handles.empties import delete, free_colour, make_empty, matrix_of
-from ..pin_tool import places
+from ..pin_tool import pins
 from ..results import placement
 
 MOST_KNOWN = 1000  # places whose nearest vertices are remembered
@@ -80,8 +80,8 @@ def read(source, space, seen=None, rest=None):
 
 def place(context, source, target, rest, on_target):
     """Adds a pair at the surface points nearest to two world locations, (3,) each."""
-    at_rest = places.find(context, source, rest, 0.0).rest
-    return add(context, source, target, (at_rest, places.find(context, target, on_target, 0.0).now))
+    at_rest = pins.find(context, source, rest, 0.0).rest
+    return add(context, source, target, (at_rest, pins.find(context, target, on_target, 0.0).now))
 
 
 def add(context, source, target, pair):

@@ -10,6 +10,7 @@ import creatures
 import numpy as np
 import stage
 from mathutils import Matrix, Vector
+from mathutils.kdtree import KDTree
 from shapes import Shape
 
 import arapfields as af
@@ -150,3 +151,121 @@ def suzanne(levels=2):
     triangles = np.array([triangle.vertices for triangle in mesh.loop_triangles], np.int64)
     bpy.data.objects.remove(item, do_unlink=True)
     return Shape(vertices, triangles, np.tile((0.42, 0.20, 0.08), (len(vertices), 1)))
+
+
+# Shapes as Gaussian splats, and pictures of splats, without a surface: Zwicker et al. 2001, in NumPy.
+
+THICKNESS = 0.08  # of a splat across the surface, as a share of its width along it
+SPREAD = 0.72  # of a splat's width, over the distance of its neighbours
+BAND = 0.28209479177387814  # the harmonic of band 0
+LIGHT = np.array([0.35, -0.55, 0.75]) / np.linalg.norm([0.35, -0.55, 0.75])
+SEEN = 3.0  # standard deviations that are drawn
+
+
+def splats_of_surface(shape, count, seed=0):
+    """So many flat, oblong splats on a shape, with its colours and the light that falls on it."""
+    samples, rng = (
+        af.sample_mesh(shape.vertices, shape.triangles, count, seed=seed),
+        np.random.default_rng(seed),
+    )
+    tree = KDTree(len(shape.vertices))
+    for place, vertex in enumerate(shape.vertices):
+        tree.insert(vertex, place)
+    tree.balance()
+    nearest = [tree.find(point)[1] for point in samples.points]
+    area = np.linalg.norm(
+        np.cross(*np.diff(shape.vertices[shape.triangles], axis=1).swapaxes(0, 1)), axis=1
+    ).sum()
+    width = SPREAD * np.sqrt(area / 2 / count)
+    normals = np.asarray(samples.normals)
+    first = np.cross(normals, rng.normal(size=normals.shape))
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    axes = np.stack([normals, first, np.cross(normals, first)], axis=2)
+    scales = width * np.array([THICKNESS, 1.35, 0.8]) * rng.uniform(0.8, 1.2, (count, 1))
+    shade = 0.35 + 0.65 * np.maximum(normals @ LIGHT, 0)
+    colours = (shape.colours[nearest] * shade[:, None]) ** (1 / 2.2)
+    harmonics = ((colours - 0.5) / BAND)[:, None, :]
+    return af.GaussianSplats(samples.points, quaternions(axes), scales, np.full(count, 0.95), harmonics)
+
+
+def quaternions(axes):
+    """(n, 4) w, x, y, z of rotations (n, 3, 3)."""
+    products = np.empty((len(axes), 4, 4))  # of the quaternion with itself, four times
+    m = axes
+    diagonal = [m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]]
+    signs = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    for k in range(4):
+        products[:, k, k] = 1 + sum(s * d for s, d in zip(signs[k], diagonal, strict=True))
+    for i, (a, b) in enumerate([(2, 1), (0, 2), (1, 0)], 1):
+        products[:, 0, i] = products[:, i, 0] = m[:, a, b] - m[:, b, a]
+    for i, j in ((1, 2), (1, 3), (2, 3)):
+        products[:, i, j] = products[:, j, i] = m[:, i - 1, j - 1] + m[:, j - 1, i - 1]
+    best = np.argmax(np.einsum("nkk->nk", products), axis=1)
+    rows = products[np.arange(len(m)), best]
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+
+
+def rotations(turns):
+    """(n, 3, 3) of unit quaternions."""
+    w, v = turns[:, :1, None], turns[:, None, 1:]
+    cross = np.cross(np.broadcast_to(np.eye(3), (len(turns), 3, 3)), turns[:, None, 1:])
+    return (2 * w * w - 1) * np.eye(3) + 2 * v * v.swapaxes(1, 2) - 2 * w * cross
+
+
+def splat_picture(splats, eye, target, size, focal=2.4, ground=None):
+    """(height, width, 3) bytes on white; `ground`: a height at which a soft shadow lies."""
+    width, height = size
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, (0, 0, 1))
+    right /= np.linalg.norm(right)
+    turn = np.array([right, np.cross(right, forward), -forward])
+    image, left = np.zeros((height, width, 3), np.float32), np.ones((height, width), np.float32)
+    scales, turns = np.asarray(splats.scales, float), np.asarray(splats.rotations, float)
+    spread = rotations(turns) * scales[:, None, :]
+    centers = np.asarray(splats.centers, float)
+    colours = np.clip(0.5 + BAND * np.asarray(splats.harmonics, float)[:, 0], 0, 1)
+    view = (turn, eye, focal, image, left)
+    composite(view, centers, spread, colours, np.asarray(splats.opacities, float))
+    if ground is not None:
+        flat = centers.copy()
+        flat[:, 2] = ground
+        dark = spread.copy() * 1.5
+        dark[:, 2] = 0
+        dark[:, 0, 0] += 0.02
+        dark[:, 1, 1] += 0.02
+        composite(view, flat, dark, np.full_like(colours, 0.82), np.full(len(flat), 0.06))
+    return np.uint8(255 * np.clip(image + left[..., None], 0, 1))
+
+
+def composite(view, centers, spread, colours, opacities):
+    """Draws splats, the nearest first, into what is left."""
+    turn, eye, focal, image, left = view
+    height, width = left.shape
+    seen = (centers - eye) @ turn.T
+    depth = -seen[:, 2]
+    scale = focal * height / 2
+    middle = np.column_stack(
+        [width / 2 + scale * seen[:, 0] / depth, height / 2 - scale * seen[:, 1] / depth]
+    )
+    slope = np.zeros((len(seen), 2, 3))
+    slope[:, 0, 0], slope[:, 1, 1] = scale / depth, -scale / depth
+    slope[:, 0, 2], slope[:, 1, 2] = scale * seen[:, 0] / depth**2, -scale * seen[:, 1] / depth**2
+    half = slope @ turn @ spread
+    flat = half @ half.swapaxes(1, 2) + 0.15 * np.eye(2)
+    inverse = np.linalg.inv(flat)
+    reach = SEEN * np.sqrt(np.einsum("nkk->nk", flat))
+    low = np.maximum(np.floor(middle - reach).astype(int), 0)
+    high = np.minimum(np.ceil(middle + reach).astype(int) + 1, (width, height))
+    for i in np.argsort(depth, kind="stable"):
+        (x, y), (right, below) = low[i], high[i]
+        if right <= x or below <= y:
+            continue
+        there = left[y:below, x:right]
+        if there.max() < 0.004:
+            continue
+        u = np.arange(x, right) + 0.5 - middle[i, 0]
+        v = (np.arange(y, below) + 0.5 - middle[i, 1])[:, None]
+        a, b, c = inverse[i, 0, 0], inverse[i, 0, 1], inverse[i, 1, 1]
+        alpha = opacities[i] * np.exp(-0.5 * (a * u * u + 2 * b * u * v + c * v * v))
+        image[y:below, x:right] += (there * alpha)[..., None] * colours[i]
+        there *= 1 - alpha

@@ -18,7 +18,7 @@ from people import seen_mesh
 
 import arapfields as af
 
-from . import splat_view
+from . import common
 from .common import add, samples_of, shape, stack, turned, warped
 from .deforming import CASES
 from .styling import OPTIONS
@@ -298,10 +298,10 @@ def wrap_loop(output):
     stack([rest, end], output / "workflow-wrap.png", gap=0, horizontal=True)
     far = moved("Dog")
     apart = -dog.location.x
-    from addon.field_modifier import inputs
+    from addon.field_modifier import node_group
 
     def pose(share):
-        inputs.put(dog.modifiers["ARAP Fields"], "Factor", share)
+        node_group.put(dog.modifiers["ARAP Fields"], "Factor", share)
         dog.location.x = -apart * share
         dog.update_tag()
 
@@ -441,7 +441,7 @@ def draw_loop_splats(output):
     import arapfields as af
 
     octopus = shape("octopus")
-    scan = splat_view.of_surface(octopus, SPLATS)
+    scan = common.splats_of_surface(octopus, SPLATS)
     samples = af.sample_splats(scan, 6000)
     boxes = CASES["octopus"][1]
     live = af.LiveDeformer(samples, [box.handle for box in boxes])
@@ -455,7 +455,7 @@ def draw_loop_splats(output):
     def picture(splats):
         from PIL import Image
 
-        return Image.fromarray(splat_view.picture(splats, EYE, TARGET, SIZE, focal=4.6, ground=ground))
+        return Image.fromarray(common.splat_picture(splats, EYE, TARGET, SIZE, focal=4.6, ground=ground))
 
     frames, seconds = 4 if stage.DRAFT else SPLAT_FRAMES, 0.0
     taken = []

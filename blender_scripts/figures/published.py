@@ -6,8 +6,7 @@ import time
 import numpy as np
 import stage
 from at_hand import PEERS, data_folder
-from shapes import Shape
-from standing import enclosed
+from shapes import Shape, enclosed
 
 import arapfields as af
 

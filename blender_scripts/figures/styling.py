@@ -3,8 +3,8 @@
 
 import bpy
 import numpy as np
+import shapes
 import stage
-import standing
 from mathutils import Matrix
 from shapes import Ellipsoid, Shape, build
 
@@ -125,16 +125,16 @@ def stylized_by_default(rest, samples, style):
     preferred = af.preferred_normals(style)
     field = af.stylize(samples, style)
     moved = warped(rest, field)
-    parts = standing.feet(rest.vertices, rest.triangles)
+    parts = shapes.feet(rest.vertices, rest.triangles)
     before, after = rest.vertices, moved.vertices
     figures = {
         "preference_rest": af.gauss_preference(samples.normals, preferred).mean(),
         "preference": field.report.preference,
-        "share_rest": standing.share_along(before, rest.triangles, preferred),
-        "share": standing.share_along(after, rest.triangles, preferred),
-        "tilt": standing.tilt(before, after, rest.triangles),
-        "unevenness": standing.unevenness(after, standing.on_the_ground(before, parts), np.ptp(before[:, 2])),
-        "volume": standing.enclosed(after, rest.triangles) / standing.enclosed(before, rest.triangles),
+        "share_rest": shapes.share_along(before, rest.triangles, preferred),
+        "share": shapes.share_along(after, rest.triangles, preferred),
+        "tilt": shapes.tilt(before, after, rest.triangles),
+        "unevenness": shapes.unevenness(after, shapes.on_the_ground(before, parts), np.ptp(before[:, 2])),
+        "volume": shapes.enclosed(after, rest.triangles) / shapes.enclosed(before, rest.triangles),
         "flipped_share": field.report.flipped_share,
         "min_determinant": field.report.min_determinant,
     }

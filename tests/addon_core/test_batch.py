@@ -11,7 +11,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from support.programs.batches import FakeLaunch, batch, make_folders, starts, statuses
+from support.programs.batches import FakeLaunch, batch, make_folders, make_slow_inputs, starts, statuses
 
 from addon.commands.batch import Children, Record, described, differences, flags, plan, run_batch, understand
 from addon.commands.parser import parse, solve_settings
@@ -287,10 +287,7 @@ COUNT = 60
 
 @pytest.fixture
 def many(tmp_path):
-    (tmp_path / "in").mkdir()
-    for i in range(COUNT):
-        (tmp_path / f"in/slow{i:02d}.ply").write_text(str(i))
-    return tmp_path
+    return make_slow_inputs(tmp_path, COUNT)
 
 
 def start(folder, *flags):

@@ -10,8 +10,7 @@ import pytest
 from support.geometry.meshes import sphere
 
 import arapfields as af
-from addon.core.file_checks import are_whole_meshes
-from addon.core.runtime.fit_cache import FitCache, fit_key
+from addon.core.files import FitCache, are_whole_meshes, fit_key
 
 # The cache of fits: keys that follow content and options, files that come and go.
 

@@ -29,8 +29,7 @@ SECTIONS = {  # section: its module, where run_<section>() measures it
         "solves": ("deform", "stylize", "contact", "skin"),
         "live": ("live", "live_compare"),
         "conditions": ("backends", "busy", "sizes"),
-        "defaults": ("defaults",),
-        "exact": ("exact",),
+        "exact": ("exact", "defaults"),
         "peers": ("peers",),
     }.items()
     for section in sections

@@ -24,7 +24,7 @@ if IN_BLENDER:
 
     from addon.animation import bake_job, caches
     from addon.blender import modifier_stack
-    from addon.blender.actions import curves_of
+    from addon.blender.evaluation import curves_of
     from addon.core.runtime import jobs
     from addon.core.runtime.jobs import Pause, run_to_completion
     from addon.field_modifier import cache_modifier

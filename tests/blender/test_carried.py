@@ -18,10 +18,10 @@ if IN_BLENDER:
 
     import arapfields as af
     from addon.blender import mesh_arrays, modifier_stack
-    from addon.blender.actions import curves_of
+    from addon.blender.evaluation import curves_of
     from addon.blender.object_references import owner_of
     from addon.core.runtime import jobs
-    from addon.field_modifier import inputs
+    from addon.field_modifier import node_group
     from addon.live import sessions
 
 pytestmark = pytest.mark.in_blender
@@ -781,7 +781,7 @@ def test_modifiers_behind_the_field_act_on_the_baked_object_too():
     laid = sleeve.modifiers.new("Laid", "SHRINKWRAP")
     laid.target, laid.wrap_mode, laid.offset = bar, "OUTSIDE", 0.05
     sleeve.modifiers.new("Finer", "SUBSURF")
-    inputs.put(scenes.reading_nodes(sleeve, bar), "Share", 0.25)
+    node_group.put(scenes.reading_nodes(sleeve, bar), "Share", 0.25)
     scenes.activate(sleeve, bar)
     bpy.ops.arapfields.carry()
     for frame, height in ((1, 0.0), (3, 0.4)):
@@ -801,7 +801,7 @@ def test_modifiers_behind_the_field_act_on_the_baked_object_too():
         assert bpy.ops.arapfields.bake(format="KEYS", start=1, end=3) == {"FINISHED"}
         baked = bpy.data.objects["Sleeve_baked"]
         assert [one.type for one in baked.modifiers] == ["SHRINKWRAP", "SUBSURF", "NODES"]
-        read = [inputs.get(baked.modifiers["Nodes"], name) for name in ("Goal", "Share")]
+        read = [node_group.get(baked.modifiers["Nodes"], name) for name in ("Goal", "Share")]
         assert read == [bpy.data.objects["Bar_baked"], 0.25]
         for frame, points in live.items():
             bpy.context.scene.frame_set(frame)

@@ -361,7 +361,7 @@ if inside.IN_BLENDER:
 
     from addon.core.geometry.spaces import space_of
     from addon.handles import empties
-    from addon.live import sessions, stored
+    from addon.live import live_modifier, sessions
     from addon.names import HANDLES, HANDLES_MARK
 
 LIFTED = (1.0, 0.0, 0.6)  # where the pin on the bar's right end is dragged to
@@ -413,11 +413,11 @@ def constrained(bar):
 @pytest.mark.parametrize("change", ["moved", "turned", "scaled", "mirrored", "parented", "constrained"])
 def test_moving_the_mesh_moves_the_pose(change):
     bar, empty = posed_bar()
-    shape, mark = local_points(bar), stored.mark(bar)
+    shape, mark = local_points(bar), live_modifier.mark(bar)
     before = np.linalg.inv(bar.matrix_world) @ np.array(empty.matrix_world)
     globals()[change](bar)
     step(refined=True)
-    assert np.array_equal(local_points(bar), shape) and stored.mark(bar) == mark
+    assert np.array_equal(local_points(bar), shape) and live_modifier.mark(bar) == mark
     after = np.linalg.inv(bar.matrix_world) @ np.array(empty.matrix_world)
     assert np.abs(after - before).max() < 1e-5 and not bar.arapfields.handles[0].in_world
 

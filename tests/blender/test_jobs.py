@@ -31,7 +31,7 @@ if IN_BLENDER:
     from addon.core.runtime import jobs, native
     from addon.core.runtime.jobs import JobCancelled, Pause
     from addon.deform.operators import ARAPFIELDS_OT_deform
-    from addon.field_modifier import inputs
+    from addon.field_modifier import node_group
     from addon.handles import empties, operators
     from addon.jobs import display, job_operator
     from addon.jobs import operators as job_operators
@@ -249,7 +249,7 @@ def shown_first():
 def test_a_result_takes_the_modifier_that_a_first_shape_made(ends):
     """Its inputs may be in the user's hands: Blender crashed when it went."""
     bar, coroutine, preview = shown_first()
-    inputs.put(bar.modifiers[0], "Factor", 0.5)
+    node_group.put(bar.modifiers[0], "Factor", 0.5)
     if ends == "CANCELLED":
         jobs.running().cancel()
     assert steps_until(coroutine, lambda: False) == {ends}
@@ -257,8 +257,8 @@ def test_a_result_takes_the_modifier_that_a_first_shape_made(ends):
     if ends == "CANCELLED":
         assert not bar.modifiers
         return
-    assert len(bar.modifiers) == 1 and inputs.get(bar.modifiers[0], "Factor") == 0.5
-    inputs.put(bar.modifiers[0], "Factor", 1.0)
+    assert len(bar.modifiers) == 1 and node_group.get(bar.modifiers[0], "Factor") == 0.5
+    node_group.put(bar.modifiers[0], "Factor", 1.0)
     bpy.context.view_layer.update()
     shown = scenes.world_points(bar)
     bpy.ops.arapfields.remove_field()

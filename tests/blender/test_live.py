@@ -25,7 +25,7 @@ if IN_BLENDER:
     from addon.core.geometry import spaces
     from addon.core.runtime import jobs
     from addon.core.runtime.jobs import run_to_completion
-    from addon.field_modifier import inputs, motion
+    from addon.field_modifier import motion, node_group
     from addon.live import recovery, sessions
     from addon.live.live_solver import LiveSolver
     from addon.pin_tool import drag
@@ -720,7 +720,7 @@ def test_what_was_there_before_live_mode_comes_back_bit_for_bit():
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.3
     bpy.ops.arapfields.deform(**scenes.QUICK)
-    inputs.put(bar.modifiers[0], "Factor", 0.7)
+    node_group.put(bar.modifiers[0], "Factor", 0.7)
     before, points = scenes.everything(bar), scenes.world_points(bar)
     bpy.ops.arapfields.live()
     moving.location.x += 0.3
@@ -729,7 +729,7 @@ def test_what_was_there_before_live_mode_comes_back_bit_for_bit():
     scenes.activate(bar)
     bpy.ops.arapfields.live()
     assert scenes.everything(bar) == before and np.array_equal(scenes.world_points(bar), points)
-    assert inputs.get(bar.modifiers[0], "Factor") > 0.69
+    assert node_group.get(bar.modifiers[0], "Factor") > 0.69
 
 
 def test_undone_steps_end_or_refresh_live_mode():

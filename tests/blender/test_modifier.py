@@ -26,7 +26,7 @@ if IN_BLENDER:
     from addon.blender import modifier_stack
     from addon.blender.object_references import source_of
     from addon.core.runtime import jobs
-    from addon.field_modifier import field_nodes, inputs
+    from addon.field_modifier import field_nodes, node_group
     from addon.poses import applying
     from addon.solver import frame_solver
     from addon.surface import source_surface
@@ -53,12 +53,12 @@ def test_the_modifier_does_what_the_field_does_by_hand(case):
     moved = local_points(bar)
     assert np.abs(moved - rest).max() > 0.3
     assert np.abs(moved - by_hand(bar, field)).max() < BY_HAND
-    inputs.put(modifier, "Factor", 0.5)
+    node_group.put(modifier, "Factor", 0.5)
     assert np.abs(local_points(bar) - by_hand(bar, field, 0.5)).max() < BY_HAND
-    inputs.put(modifier, "Factor", 1.0)
+    node_group.put(modifier, "Factor", 1.0)
     group = bar.vertex_groups.new(name="Mask")
     group.add([v.index for v in bar.data.vertices if v.co.x > 0.5], 1.0, "REPLACE")
-    inputs.put_attribute(modifier, "Mask", "Mask")
+    node_group.put_attribute(modifier, "Mask", "Mask")
     masked = local_points(bar)
     assert np.abs(masked - rest).max() > 0.3
     if case in ("alone", "armature before", "shape keys", "mirror before"):
@@ -143,7 +143,7 @@ def test_offsets_of_a_shared_mesh_with_many_attributes_lie_alone():
     for z in (0.4, 0.2):
         moving.location.z = z
         assert bpy.ops.arapfields.deform(**scenes.QUICK) == {"FINISHED"}
-        helper = inputs.get(modifier_stack.find(bar), "Offsets").data
+        helper = node_group.get(modifier_stack.find(bar), "Offsets").data
         names = {one.name for one in helper.attributes if not (one.is_required or one.is_internal)}
         assert names == {"ARAP Fields"} and scenes.everything(bar) == before
 
@@ -243,7 +243,7 @@ def test_reading_the_shape_leaves_no_users_behind():
     before = named.users
     with modifier_stack.mesh_of(bpy.context, bar, []) as mesh:
         assert len(mesh.vertices) == len(bar.data.vertices)
-    assert named.users == before and inputs.get(modifier, "Goal") == named
+    assert named.users == before and node_group.get(modifier, "Goal") == named
 
 
 def test_a_result_brings_no_source_along_when_it_is_appended():
@@ -286,7 +286,7 @@ def test_a_modifier_that_shows_nothing_is_named(way):
     bpy.ops.arapfields.deform(**scenes.QUICK)
     modifier = bar.modifiers[0]
     if way == "factor":
-        inputs.put(modifier, "Factor", 0.0)
+        node_group.put(modifier, "Factor", 0.0)
     else:
         modifier.show_viewport = False
     if way == "keyed":
@@ -491,9 +491,9 @@ def test_the_group_is_the_librarys_field(curl, count):
     assert np.abs(after - rest).max() > 0.2 * size
     assert np.abs(scenes.world_points(points) - after).max() < EXACT * size
     if curl:
-        inputs.put(points.modifiers["ARAP Field"], "Factor", 0.5)
+        node_group.put(points.modifiers["ARAP Field"], "Factor", 0.5)
         assert np.abs(scenes.world_points(points) - (rest + after) / 2).max() < EXACT * size
-        inputs.put(points.modifiers["ARAP Field"], "Factor", 0.0)
+        node_group.put(points.modifiers["ARAP Field"], "Factor", 0.0)
         assert np.array_equal(scenes.world_points(points), rest)
 
 
@@ -586,7 +586,7 @@ def test_instances_turn_and_curves_bend():
     assert np.abs(shown(hair) - by_field(bar, strands)[0]).max() < EXACT
     assert np.abs(bezier(cord) - by_field(bar, before)[0]).max() < EXACT
     modifier = cubes.modifiers["ARAP Field"]
-    inputs.put(modifier, "Realize Instances", True)
+    node_group.put(modifier, "Realize Instances", True)
     assert len(scenes.world_points(cubes)) == 160 and not len(instances(cubes))
 
 

@@ -22,7 +22,7 @@ if IN_BLENDER:
     from addon.handles.empties import PALETTE, free_colour
     from addon.live import sessions
     from addon.live.live_solver import prefetch
-    from addon.pin_tool import drag, hints, hover, pins, places, screen
+    from addon.pin_tool import drag, drawing, hover, pins, screen
     from addon.solver import frame_solver
 
 pytestmark = pytest.mark.in_blender
@@ -351,15 +351,15 @@ def test_the_label_says_what_a_press_does():
     empty = pin(bar, (-0.5, 0.0, 0.25))
     handle = hover.Target("HANDLE", hover.ObjectReference(bar), hover.ObjectReference(empty))
     ring = hover.Target("RING", hover.ObjectReference(bar), hover.ObjectReference(empty))
-    said = [hints.label(hover.under(bpy.context, from_above(x))) for x in (-0.9, 0.5)]
+    said = [drawing.label(hover.under(bpy.context, from_above(x))) for x in (-0.9, 0.5)]
     assert said == ["Pin Bar", "Alt-click to pin Above"]
-    assert [hints.label(one) for one in (handle, ring)] == ["Drag Pin 1", "Turn Pin 1"]
+    assert [drawing.label(one) for one in (handle, ring)] == ["Drag Pin 1", "Turn Pin 1"]
     pins.entry_of(empty).anchor = True
-    assert hints.label(handle) == "Choose Pin 1, an anchor"
+    assert drawing.label(handle) == "Choose Pin 1, an anchor"
     sessions.end(bpy.context, bar)
     bar.arapfields.result = "NEW"
-    assert hints.label(hover.under(bpy.context, from_above(-0.9))).startswith("Pins move Bar itself")
-    texts = {hints.keys(one, None) for one in (handle, ring, None)} | {hints.keys(None, object())}
+    assert drawing.label(hover.under(bpy.context, from_above(-0.9))).startswith("Pins move Bar itself")
+    texts = {drawing.keys(one, None) for one in (handle, ring, None)} | {drawing.keys(None, object())}
     assert len(texts) == 4 and "" in texts
 
 
@@ -420,7 +420,7 @@ def test_a_known_face_decides_where_surfaces_touch():
     motion.write(item, motion.Motion(np.array([(0, 0, -z) for *_, z in points], float)))
     bpy.context.view_layer.update()
     for face in (0, 1):
-        place = places.find(bpy.context, item, np.array([0.3, 0.4, 0.0]), 0.1, face, 2)
+        place = pins.find(bpy.context, item, np.array([0.3, 0.4, 0.0]), 0.1, face, 2)
         assert np.allclose(place.rest, [0.3, 0.4, face], atol=1e-6)
 
 

@@ -17,7 +17,7 @@ if IN_BLENDER:
     from addon.blender import modifier_stack, vertex_groups
     from addon.core.errors import UserError
     from addon.core.runtime.jobs import run_to_completion
-    from addon.field_modifier import inputs
+    from addon.field_modifier import node_group
     from addon.handles import held_counts
     from addon.live import sessions
 
@@ -177,9 +177,9 @@ def test_where_it_is_zero_points_stay_bit_for_bit_whatever_is_solved():
     settings.mask = ""
     assert modifier_stack.find_cache(bar).vertex_group == ""
     bpy.ops.arapfields.deform(**RUN)
-    inputs.put_attribute(modifier_stack.find(bar), "Mask", "Face")  # the user's own, at the modifier
+    node_group.put_attribute(modifier_stack.find(bar), "Mask", "Face")  # the user's own, at the modifier
     bpy.ops.arapfields.deform(**RUN)
-    assert inputs.get_attribute(modifier_stack.find(bar), "Mask") == "Face"
+    assert node_group.get_attribute(modifier_stack.find(bar), "Mask") == "Face"
 
 
 def test_a_mask_that_is_gone_is_named():

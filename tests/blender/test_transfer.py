@@ -19,10 +19,10 @@ if IN_BLENDER:
 
     import arapfields as af
     from addon.blender import mesh_arrays, modifier_stack, vertex_groups
-    from addon.blender.actions import curves_of
+    from addon.blender.evaluation import curves_of
     from addon.carried import rest_bones
     from addon.core.runtime import jobs
-    from addon.field_modifier import inputs, motion
+    from addon.field_modifier import motion, node_group
     from addon.wrap import transfer
     from addon.wrap.matching import Wrapped
     from addon.wrap.operators import ARAPFIELDS_OT_transfer
@@ -346,7 +346,7 @@ def test_nodes_drivers_and_bones_of_copies_read_what_the_target_has():
         owners = eye.data.shape_keys, rig
         driven = [one.animation_data.drivers[0].driver.variables[0].targets[0].id for one in owners]
         tracked = rig.pose.bones["Upper"].constraints[0].target
-        return [*driven, tracked, inputs.get(eye.modifiers["Nodes"], "Goal")]
+        return [*driven, tracked, node_group.get(eye.modifiers["Nodes"], "Goal")]
 
     twin = bpy.data.objects["Rig Soup"]
     assert read_by(eye, rig) == [item.data.shape_keys, rig.data, item, item]

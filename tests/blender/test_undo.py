@@ -33,6 +33,20 @@ WALKS = (
 )
 
 
+def few_centers(test):
+    """Solves take milliseconds."""
+
+    @functools.wraps(test)
+    def wrapped(*given, **named):
+        end = walk_scenes.few_centers()
+        try:
+            test(*given, **named)
+        finally:
+            end()
+
+    return wrapped
+
+
 def build():
     bpy.context.preferences.edit.use_global_undo = True
     bpy.context.preferences.edit.undo_steps = 64
@@ -74,178 +88,143 @@ def take(what, bar):
 
 
 @pytest.mark.parametrize("walk", WALKS)
+@few_centers
 def test_undo_meets_no_reference_to_what_is_gone(walk):
-    end = walk_scenes.few_centers()
-    try:
-        build()
-        bpy.ops.ed.undo_push(message="begin")
-        for step in walk.split():
-            if step in ("undo", "redo"):
-                getattr(bpy.ops.ed, step)()
-            else:
-                take(step[:-1], bpy.data.objects[f"Bar{step[-1]}"])
-                bpy.ops.ed.undo_push(message=step)  # what timers do comes after the step
-            assert not walk_scenes.dangling()
-            walk_scenes.settle()
-            assert not walk_scenes.dangling()
-    finally:
-        end()
+    build()
+    bpy.ops.ed.undo_push(message="begin")
+    for step in walk.split():
+        if step in ("undo", "redo"):
+            getattr(bpy.ops.ed, step)()
+        else:
+            take(step[:-1], bpy.data.objects[f"Bar{step[-1]}"])
+            bpy.ops.ed.undo_push(message=step)  # what timers do comes after the step
+        assert not walk_scenes.dangling()
+        walk_scenes.settle()
+        assert not walk_scenes.dangling()
 
 
+@few_centers
 def test_live_mode_that_ended_by_an_error_comes_back_by_undo():
     """Its end is a step of undo by itself; the step before is live, though its handle is gone already."""
-    end = walk_scenes.few_centers()
-    try:
-        build()
-        bar = bpy.data.objects["Bar2"]
-        take("live", bar)
-        bpy.ops.ed.undo_push(message="live")
-        walk_scenes.settle()
-        shown = scenes.world_points(bar)
-        for empty in [entry.empty for entry in bar.arapfields.handles]:
-            bpy.data.objects.remove(empty)
-        bpy.ops.ed.undo_push(message="deleted")
-        walk_scenes.settle()
-        assert not sessions.live and not bar.arapfields.live_kind
-        for _ in range(2):
-            bpy.ops.ed.undo()
-            walk_scenes.settle()
-        bar = bpy.data.objects["Bar2"]
-        assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
-    finally:
-        end()
-
-
-def test_a_live_object_of_its_own_comes_back_by_undo():
-    end = walk_scenes.few_centers()
-    try:
-        build()
-        bar = bpy.data.objects["Bar2"]
-        take("new", bar)
-        take("live", bar)
-        bpy.ops.ed.undo_push(message="live")
-        walk_scenes.settle()
-        shown = scenes.world_points(bpy.data.objects["Bar2_live"])
-        scenes.activate(bar)
-        assert bpy.ops.arapfields.live() == {"FINISHED"}
-        bpy.ops.ed.undo_push(message="off")
-        assert "Bar2_live" not in bpy.data.objects and not bar.hide_render
+    build()
+    bar = bpy.data.objects["Bar2"]
+    take("live", bar)
+    bpy.ops.ed.undo_push(message="live")
+    walk_scenes.settle()
+    shown = scenes.world_points(bar)
+    for empty in [entry.empty for entry in bar.arapfields.handles]:
+        bpy.data.objects.remove(empty)
+    bpy.ops.ed.undo_push(message="deleted")
+    walk_scenes.settle()
+    assert not sessions.live and not bar.arapfields.live_kind
+    for _ in range(2):
         bpy.ops.ed.undo()
         walk_scenes.settle()
-        bar = bpy.data.objects["Bar2"]
-        assert sessions.is_live(bar) and bar.hide_render
-        assert np.array_equal(scenes.world_points(bpy.data.objects["Bar2_live"]), shown)
-    finally:
-        end()
+    bar = bpy.data.objects["Bar2"]
+    assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
 
 
+@few_centers
+def test_a_live_object_of_its_own_comes_back_by_undo():
+    build()
+    bar = bpy.data.objects["Bar2"]
+    take("new", bar)
+    take("live", bar)
+    bpy.ops.ed.undo_push(message="live")
+    walk_scenes.settle()
+    shown = scenes.world_points(bpy.data.objects["Bar2_live"])
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="off")
+    assert "Bar2_live" not in bpy.data.objects and not bar.hide_render
+    bpy.ops.ed.undo()
+    walk_scenes.settle()
+    bar = bpy.data.objects["Bar2"]
+    assert sessions.is_live(bar) and bar.hide_render
+    assert np.array_equal(scenes.world_points(bpy.data.objects["Bar2_live"]), shown)
+
+
+@few_centers
 def test_a_live_object_behind_its_extracted_surface_stays_hidden_under_undo():
     """Live mode begins anew with each change of what is carried, and hides and shows nothing then."""
-    end = walk_scenes.few_centers()
-    try:
-        build()
-        bar = bpy.data.objects["Bar2"]
-        bar.arapfields.resolution = 12
-        take("live", bar)
-        bpy.ops.ed.undo_push(message="live")
-        walk_scenes.settle()
-        scenes.activate(bar)
-        assert bpy.ops.arapfields.extract() == {"FINISHED"}
-        bpy.ops.ed.undo_push(message="extract")
-        walk_scenes.settle()
-        scenes.activate(bpy.data.objects["Bar2_implicit"], bar)
-        assert bpy.ops.arapfields.carry() == {"FINISHED"}
-        bpy.ops.ed.undo_push(message="carry")
-        walk_scenes.settle()
-        assert bar.hide_get() and not bpy.data.objects["Bar2_implicit"].hide_get()
-        bpy.ops.ed.undo()
-        walk_scenes.settle()
-        assert bpy.data.objects["Bar2"].hide_get() and not bpy.data.objects["Bar2_implicit"].hide_get()
-    finally:
-        end()
+    build()
+    bar = bpy.data.objects["Bar2"]
+    bar.arapfields.resolution = 12
+    take("live", bar)
+    bpy.ops.ed.undo_push(message="live")
+    walk_scenes.settle()
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.extract() == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="extract")
+    walk_scenes.settle()
+    scenes.activate(bpy.data.objects["Bar2_implicit"], bar)
+    assert bpy.ops.arapfields.carry() == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="carry")
+    walk_scenes.settle()
+    assert bar.hide_get() and not bpy.data.objects["Bar2_implicit"].hide_get()
+    bpy.ops.ed.undo()
+    walk_scenes.settle()
+    assert bpy.data.objects["Bar2"].hide_get() and not bpy.data.objects["Bar2_implicit"].hide_get()
 
 
+@few_centers
 def test_a_shape_held_by_an_anchor_is_in_the_step_of_the_press():
-    end = walk_scenes.few_centers()
-    try:
-        walk_scenes.build_shapes()
-        ball = bpy.data.objects["Ball"]
-        scenes.activate(ball)
-        assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
-        walk_scenes.settle()
-        ball.arapfields.stylize.use_handles = True
-        walk_scenes.settle()
-        shown = scenes.world_points(ball)
-        pin(ball, shown[0], 0.3, anchor=True)
-        bpy.ops.ed.undo_push(message="anchor")
-        assert ball.arapfields.held  # before any timer
-        walk_scenes.settle()
-        bpy.ops.ed.undo_push(message="another step")
-        bpy.ops.ed.undo()
-        walk_scenes.settle()
-        assert np.array_equal(scenes.world_points(bpy.data.objects["Ball"]), shown)
-    finally:
-        end()
+    walk_scenes.build_shapes()
+    ball = bpy.data.objects["Ball"]
+    scenes.activate(ball)
+    assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
+    walk_scenes.settle()
+    ball.arapfields.stylize.use_handles = True
+    walk_scenes.settle()
+    shown = scenes.world_points(ball)
+    pin(ball, shown[0], 0.3, anchor=True)
+    bpy.ops.ed.undo_push(message="anchor")
+    assert ball.arapfields.held  # before any timer
+    walk_scenes.settle()
+    bpy.ops.ed.undo_push(message="another step")
+    bpy.ops.ed.undo()
+    walk_scenes.settle()
+    assert np.array_equal(scenes.world_points(bpy.data.objects["Ball"]), shown)
 
 
+@few_centers
 def test_live_mode_that_is_refused_leaves_what_the_file_says():
     """Also where the user has removed the modifier whose motion had a name."""
-    end = walk_scenes.few_centers()
-    try:
-        build()
-        bar = bpy.data.objects["Bar2"]
-        take("deform", bar)
-        bar.modifiers.remove(bar.modifiers["ARAP Fields"])
-        bar.arapfields.handles[0].weight = 0.0
-        scenes.activate(bar)
-        with pytest.raises(RuntimeError, match="weight"):
-            bpy.ops.arapfields.live()
-        assert bar.arapfields.moved_by == "DEFORM" and not bar.arapfields.live_kind
-    finally:
-        end()
+    build()
+    bar = bpy.data.objects["Bar2"]
+    take("deform", bar)
+    bar.modifiers.remove(bar.modifiers["ARAP Fields"])
+    bar.arapfields.handles[0].weight = 0.0
+    scenes.activate(bar)
+    with pytest.raises(RuntimeError, match="weight"):
+        bpy.ops.arapfields.live()
+    assert bar.arapfields.moved_by == "DEFORM" and not bar.arapfields.live_kind
 
 
+@few_centers
 def test_a_shape_comes_back_by_undo_after_its_helper_was_emptied():
     """Without the modifier the offsets lie on the mesh, and the helper's own are gone, which no step has."""
-    end = walk_scenes.few_centers()
-    try:
-        build()
-        bar = bpy.data.objects["Bar0"]
-        bar.modifiers["Mirror"].show_viewport = False
-        take("live", bar)
-        walk_scenes.settle()
-        bpy.ops.ed.undo_push(message="live")
-        walk_scenes.settle()
-        shown = scenes.world_points(bar)
-        bar.modifiers.remove(bar.modifiers["Mirror"])
-        bpy.ops.ed.undo_push(message="removed")
-        walk_scenes.settle()
-        bpy.ops.ed.undo()
-        walk_scenes.settle()
-        bar = bpy.data.objects["Bar0"]
-        assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
-    finally:
-        end()
+    build()
+    bar = bpy.data.objects["Bar0"]
+    bar.modifiers["Mirror"].show_viewport = False
+    take("live", bar)
+    walk_scenes.settle()
+    bpy.ops.ed.undo_push(message="live")
+    walk_scenes.settle()
+    shown = scenes.world_points(bar)
+    bar.modifiers.remove(bar.modifiers["Mirror"])
+    bpy.ops.ed.undo_push(message="removed")
+    walk_scenes.settle()
+    bpy.ops.ed.undo()
+    walk_scenes.settle()
+    bar = bpy.data.objects["Bar0"]
+    assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
 
 
 # What is shown is a function of what the file says: what hands and walks (tests/fuzz/walk) once found.
 
 OFF = 5e-3  # of the size, that a live shape may be off its fresh solve, and a release may change
 NO_MOTION = 1e-30  # where a coordinate is 0, a solve that ends at rest leaves its rounding
-
-
-def few_centers(test):
-    """Solves take milliseconds."""
-
-    @functools.wraps(test)
-    def wrapped(*given, **named):
-        end = walk_scenes.few_centers()
-        try:
-            test(*given, **named)
-        finally:
-            end()
-
-    return wrapped
 
 
 def push(message):

@@ -29,7 +29,7 @@ if IN_BLENDER:
     from addon.blender.object_references import ObjectReference
     from addon.core.geometry.spaces import space_of
     from addon.core.runtime import jobs
-    from addon.field_modifier import inputs
+    from addon.field_modifier import node_group
     from addon.handles.empties import matrix_of
     from addon.results import placement
     from addon.wrap import landmarks
@@ -57,7 +57,7 @@ def test_the_object_comes_to_lie_on_the_target_and_the_factor_goes_back():
     now = scenes.everything(item)
     assert all(now[name] == value for name, value in kept.items())
     modifier = modifier_stack.find(item)
-    inputs.put(modifier, "Factor", 0.0)
+    node_group.put(modifier, "Factor", 0.0)
     bpy.context.view_layer.update()
     plain = scenes.world_points(item)
     size = np.ptp(goal, axis=0).max()
@@ -75,10 +75,10 @@ def test_the_object_stays_where_asked_and_where_pins_hold_it():
             scenes.activate(item)
         assert bpy.ops.arapfields.wrap(**given, **SMALL) == {"FINISHED"}
         assert item.matrix_world == place
-        inputs.put(modifier_stack.find(item), "Factor", 0.0)
+        node_group.put(modifier_stack.find(item), "Factor", 0.0)
         bpy.context.view_layer.update()
         assert np.array_equal(scenes.world_points(item), rest)
-        inputs.put(modifier_stack.find(item), "Factor", 1.0)
+        node_group.put(modifier_stack.find(item), "Factor", 1.0)
 
 
 def test_a_target_that_is_a_child_of_the_object_stays_where_it_is():

@@ -12,7 +12,7 @@ import numpy as np
 import pages
 import pytest
 from support.geometry.meshes import sphere
-from support.programs.batches import starts, statuses
+from support.programs.batches import make_slow_inputs, starts, statuses
 
 import arapfields as af
 from arapfields.cli.handles import read_tracks
@@ -25,10 +25,7 @@ COUNT = 12
 
 @pytest.fixture
 def place(tmp_path):
-    (tmp_path / "in").mkdir()
-    for i in range(COUNT):
-        (tmp_path / f"in/slow{i:02d}.ply").write_text(str(i))
-    return tmp_path
+    return make_slow_inputs(tmp_path, COUNT)
 
 
 def run(*command, **environment):

@@ -7,7 +7,7 @@ from pathlib import Path
 import creatures
 import numpy as np
 import pytest
-import standing
+import shapes
 import torch
 from support.geometry import cases, meshes
 from support.oracles import gradient_of, jacobians_of, jets_with_jacobians
@@ -482,12 +482,12 @@ def styled(name, style, count=20000, **options):
 
 def looks_right(rest, moved, triangles, report, style):
     height = np.ptp(rest[:, 2])
-    parts = standing.feet(rest, triangles)
-    assert standing.unevenness(moved, standing.on_the_ground(rest, parts), height) <= MOST_UNEVEN
-    assert standing.tilt(rest, moved, triangles) <= MOST_TILT
+    parts = shapes.feet(rest, triangles)
+    assert shapes.unevenness(moved, shapes.on_the_ground(rest, parts), height) <= MOST_UNEVEN
+    assert shapes.tilt(rest, moved, triangles) <= MOST_TILT
     assert report["flipped_share"] <= 0.001
     preferred = af.preferred_normals(style)
-    before, after = (standing.share_along(v, triangles, preferred) for v in (rest, moved))
+    before, after = (shapes.share_along(v, triangles, preferred) for v in (rest, moved))
     assert after >= (2 * before if style in FINE else before)
     return after
 
@@ -495,17 +495,17 @@ def looks_right(rest, moved, triangles, report, style):
 def test_the_measures_measure():
     shape = creatures.load("dog")
     rest, triangles = shape.vertices, shape.triangles
-    parts = standing.feet(rest, triangles)
-    assert len(parts) == 4 and standing.unevenness(rest, parts, np.ptp(rest[:, 2])) < 0.01
+    parts = shapes.feet(rest, triangles)
+    assert len(parts) == 4 and shapes.unevenness(rest, parts, np.ptp(rest[:, 2])) < 0.01
     angle = np.radians(7)
     turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
-    assert standing.tilt(rest, rest @ turn.T, triangles) == pytest.approx(7, abs=1e-6)
-    assert standing.tilt(rest, rest * [1.2, 0.9, 1.1] + 3, triangles) < 2
-    assert standing.unevenness(rest @ turn.T, parts, np.ptp(rest[:, 2])) > MOST_UNEVEN
+    assert shapes.tilt(rest, rest @ turn.T, triangles) == pytest.approx(7, abs=1e-6)
+    assert shapes.tilt(rest, rest * [1.2, 0.9, 1.1] + 3, triangles) < 2
+    assert shapes.unevenness(rest @ turn.T, parts, np.ptp(rest[:, 2])) > MOST_UNEVEN
     cube = af.preferred_normals("cube")
     box = creatures.load("bar")
-    assert standing.share_along(box.vertices, box.triangles, cube) > 0.7
-    assert standing.enclosed(2 * rest, triangles) == pytest.approx(8 * standing.enclosed(rest, triangles))
+    assert shapes.share_along(box.vertices, box.triangles, cube) > 0.7
+    assert shapes.enclosed(2 * rest, triangles) == pytest.approx(8 * shapes.enclosed(rest, triangles))
 
 
 @pytest.mark.parametrize("style", QUICK)
@@ -521,7 +521,7 @@ def test_every_style_of_every_figure_stands(name, style):
     if style == "plane pair":  # without stance it becomes paper, all of it along the style
         return
     _, moved, triangles, _ = styled(name, style, sharpness=5.0, keep_stance=0.0)
-    lost = standing.share_along(moved, triangles, af.preferred_normals(style)) - share
+    lost = shapes.share_along(moved, triangles, af.preferred_normals(style)) - share
     assert lost <= (LOST_OF_LEANING if style == LEANING else MOST_LOST)
 
 

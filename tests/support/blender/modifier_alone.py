@@ -21,7 +21,7 @@ from support.blender import scenes  # noqa: E402
 
 import addon  # noqa: E402
 from addon.blender import modifier_stack, references  # noqa: E402
-from addon.field_modifier import inputs, motion  # noqa: E402
+from addon.field_modifier import motion, node_group  # noqa: E402
 
 EXACT = 1e-6  # single precision of positions of size one
 
@@ -43,19 +43,21 @@ def check_inputs():
     modifier = motion.bind(bpy.context, bar)
     motion.write(bar, motion.Motion(given))
     assert np.abs(points(bar) - (rest + given)).max() < EXACT
-    inputs.put(modifier, "Factor", 0.5)
-    assert np.abs(points(bar) - (rest + given / 2)).max() < EXACT and inputs.get(modifier, "Factor") == 0.5
+    node_group.put(modifier, "Factor", 0.5)
+    assert (
+        np.abs(points(bar) - (rest + given / 2)).max() < EXACT and node_group.get(modifier, "Factor") == 0.5
+    )
     group = bar.vertex_groups.new(name="Some")
     group.add(list(range(100)), 1.0, "REPLACE")
-    inputs.put_attribute(modifier, "Mask", "Some")
-    assert inputs.get_attribute(modifier, "Mask") == "Some"
+    node_group.put_attribute(modifier, "Mask", "Some")
+    assert node_group.get_attribute(modifier, "Mask") == "Some"
     masked = points(bar)
     assert masked[100:].tobytes() == rest[100:].tobytes()
     assert np.abs(masked[:100] - (rest + given / 2)[:100]).max() < EXACT
     if bpy.app.version >= (4, 5, 0):
         motion.choose_group(modifier, "POINT", {})
-    assert inputs.get(modifier, "Factor") == 0.5 and inputs.get_attribute(modifier, "Mask") == "Some"
-    inputs.put_attribute(modifier, "Mask", "")
+    assert node_group.get(modifier, "Factor") == 0.5 and node_group.get_attribute(modifier, "Mask") == "Some"
+    node_group.put_attribute(modifier, "Mask", "")
     assert np.abs(points(bar) - (rest + given / 2)).max() < EXACT
     modifier.show_viewport = False
     assert points(bar).tobytes() == rest.tobytes()
@@ -107,14 +109,14 @@ def check_copies():
     read, twin, other, made = (scenes.bar(name) for name in ("Read", "Twin", "Other", "Made"))
     other.modifiers.new("Laid", "SHRINKWRAP").target = read
     nodes = scenes.reading_nodes(other, read)
-    inputs.put(nodes, "Share", 0.25)
-    inputs.put_attribute(nodes, "Share", "Some")
+    node_group.put(nodes, "Share", 0.25)
+    node_group.put_attribute(nodes, "Share", "Some")
     references.copy_modifiers(made, other.modifiers)
     references.remap(references.parts_of(made), {read: twin})
     copied = made.modifiers["Nodes"]
-    assert made.modifiers["Laid"].target == inputs.get(copied, "Goal") == twin
-    assert other.modifiers["Laid"].target == inputs.get(nodes, "Goal") == read
-    assert inputs.get(copied, "Share") == 0.25 and inputs.get_attribute(copied, "Share") == "Some"
+    assert made.modifiers["Laid"].target == node_group.get(copied, "Goal") == twin
+    assert other.modifiers["Laid"].target == node_group.get(nodes, "Goal") == read
+    assert node_group.get(copied, "Share") == 0.25 and node_group.get_attribute(copied, "Share") == "Some"
 
 
 bpy.ops.wm.read_factory_settings(use_empty=True)

@@ -188,7 +188,7 @@ def delete(item):
 
 def reading_nodes(item, read):
     """Adds a Geometry Nodes modifier without effect that has the object `read` as an input."""
-    from addon.field_modifier import inputs  # tests of an installed zip have no `addon`
+    from addon.field_modifier import node_group  # tests of an installed zip have no `addon`
 
     group = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
@@ -199,7 +199,7 @@ def reading_nodes(item, read):
     group.links.new(ends[0].outputs[0], ends[1].inputs[0])
     modifier = item.modifiers.new("Nodes", "NODES")
     modifier.node_group = group
-    inputs.put(modifier, "Goal", read)
+    node_group.put(modifier, "Goal", read)
     return modifier
 
 

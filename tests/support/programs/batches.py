@@ -22,6 +22,14 @@ def make_folders(place):
     return place
 
 
+def make_slow_inputs(place, count):
+    """A folder `in` with `count` inputs that take a moment each."""
+    (place / "in").mkdir()
+    for i in range(count):
+        (place / f"in/slow{i:02d}.ply").write_text(str(i))
+    return place
+
+
 def batch(folders, *further, output="out"):
     where = ["-i", str(folders / "in"), "-o", str(folders / output)]
     return parse(["batch", "--style", "cube", *where, *further])
