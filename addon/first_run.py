@@ -57,7 +57,7 @@ def lines():
     if time.monotonic() >= welcome.until:
         return []
     return [
-        translated("ARAP Fields: take the pin tool, at the end of the toolbar, and drag a mesh"),
+        translated("ARAP Fields: take the pin tool, below Measure in the toolbar, and drag a mesh"),
         translated("All else is in the sidebar: press N and choose the tab ARAP Fields"),
         translated("The same is in the menu Object › ARAP Fields, and F3 finds it"),
     ]

@@ -56,7 +56,7 @@ def show(layout, group):
 
 
 class ARAPFIELDS_OT_copy_report(ReportingOperator, bpy.types.Operator):
-    """Copy what is known about the native library and this machine, for a bug report"""
+    """Copy what is known about this installation and machine, for a bug report"""
 
     bl_label = "Copy Report"
     guide = "jobs"

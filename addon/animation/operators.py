@@ -86,9 +86,7 @@ class CacheOperator(BakeOperator):
         taken = [path for path, own in self.places(context).items() if path.exists() and not own]
         if taken and not self.overwrite:
             names = ", ".join(path.name for path in taken)
-            raise UserError(
-                "{names} is there, and not of this object; overwrite=True replaces it", names=names
-            )
+            raise UserError("{names} is there, and not of this object; Overwrite replaces it", names=names)
 
         def make(source, kind, frames):
             path = self.path(context, source, active, values)

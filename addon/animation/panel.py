@@ -48,7 +48,7 @@ def weight(context, source, bake):
     size = caches.size_text(caches.keys_weight(len(points_of(source.data)), count - 1))
     if bake.range == "HANDLES":
         return translated("{size} for the scene's frames", size=size)
-    return translated("{count} samples, {size}", count=count, size=size)
+    return translated("{count} shapes, {size}", count=count, size=size)
 
 
 CLASSES = [ARAPFIELDS_PT_animation]

@@ -156,7 +156,7 @@ KNOWN = (".ply", ".glb", ".usdc", ".usda", ".usd")
 
 
 class ARAPFIELDS_OT_export_splats(SourceOperator, bpy.types.Operator):
-    """Write the splats as the modifier shows them: their places, shapes and colours, in world space"""
+    """Write the splats as the modifier shows them: their locations, shapes and colors, in world space"""
 
     bl_label = "Export Splats"
     guide = "animation"

@@ -155,7 +155,7 @@ def arrays_of(source, mesh):
     if not np.isfinite(arrays.vertices).all():
         broken = np.flatnonzero(~np.isfinite(arrays.vertices).all(axis=1))
         raise UserError(
-            "{name}: {count} vertices have no finite position, the first is {first}",
+            "{name}: {count} vertices are at invalid locations, the first is {first}",
             source,
             count=len(broken),
             first=broken[0],

@@ -21,7 +21,7 @@ def tells(name):
 def colour(description):
     """A colour property for the viewport."""
     return bpy.props.FloatVectorProperty(
-        name="Colour",
+        name="Color",
         description=description,
         subtype="COLOR_GAMMA",
         default=(0.27, 0.55, 1.0),

@@ -148,7 +148,7 @@ class Splats:
         count = next((count for count in COUNTS if colours.shape[1] == count), None)
         if count is None:
             raise UserError(
-                "{name}: its splats have {count} colours, not 1, 4, 9 or 16",
+                "{name}: its splats have {count} colors, not 1, 4, 9 or 16",
                 name=name,
                 count=colours.shape[1],
             )
@@ -190,7 +190,7 @@ def read(name, mesh, key, *kinds):
     flat = np.empty(width * len(attribute.data), dtype=np.float32)
     attribute.data.foreach_get(field, flat)
     if not np.isfinite(flat).all():
-        raise UserError("{name}: {attribute} of its splats has NaN or infinity", name=name, attribute=key)
+        raise UserError("{name}: {attribute} of its splats has invalid values", name=name, attribute=key)
     return flat if width == 1 else flat.reshape(-1, width)
 
 

@@ -24,7 +24,7 @@ class Carrier:
         if not len(self.points):
             raise UserError("{name} is empty; it is not carried", item)
         if not np.isfinite(self.points).all():
-            raise UserError("{name} has points that are not finite; it is not carried", item)
+            raise UserError("{name} has points at invalid locations; it is not carried", item)
 
     @staticmethod
     def is_on(item):

@@ -323,7 +323,7 @@ class Carrying:
         after = np.asarray(attachment.positions(field))
         after = after if beside is None else beside.moved(after, field)
         if not np.isfinite(after).all():
-            raise UserError("The shape has vertices that are NaN or infinite; move the handles less far")
+            raise UserError("The shape has vertices at invalid locations; move the handles less far")
         if strength != 1.0:
             rest = transform(pose.rest, pose.points)
             after = rest + strength * (after - rest)

@@ -70,7 +70,7 @@ class Fitting:
             before = transform(to_solve, points)
             after = field(before)
             if not np.isfinite(after).all():
-                raise UserError("The result has bones that are not finite; try other settings")
+                raise UserError("The result has bones at invalid locations; try other settings")
             posed = spaces.bone_poses(to_solve @ poses, before, after)
             heads, tails = after[0 :: len(spaces.BONE_POINTS)], after[1 :: len(spaces.BONE_POINTS)]
             back = inverse(to_solve)

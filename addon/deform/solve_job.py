@@ -186,7 +186,7 @@ def plan_solve_job(
         else:
             after = own
         if not np.isfinite(after).all():
-            raise UserError("The result has vertices that are not finite; try other settings")
+            raise UserError("The result has vertices at invalid locations; try other settings")
         moves, place = np.eye(4), None
         if places:
             moves = similarity(placed.now, own)

@@ -298,7 +298,7 @@ def move_handles(graph, curves, after, acts, strength, shift):
 def rows_of(field, local_to_solve, strength=1.0):
     """(n, 27) single precision, a row for each number of columns: part, place, scale, move, inside, map."""
     if not isinstance(field, native.library().RadialField):
-        raise UserError("Nodes evaluate radial fields alone: no network, no exact handles, no wrap")
+        raise UserError("Nodes know the method Fast alone, without Exact Handles or a wrap")
     arrays = field.arrays()
     affine = strength * (arrays["affine"] - np.eye(4, 3, -1))
     scale, inside = -1.0 / (6.0 * arrays["radii"] ** 2), arrays.get("embedded", 0.0)

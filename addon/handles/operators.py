@@ -184,7 +184,7 @@ class ARAPFIELDS_OT_reset_handle(RestOperator, bpy.types.Operator):
 
 
 class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
-    """Take the selected handles off the list (or the one chosen in it); with `delete`, their Empties too"""
+    """Take the selected handles off the list, or the one that is chosen in it"""
 
     bl_label = "Remove Handle"
 

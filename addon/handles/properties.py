@@ -69,7 +69,7 @@ class ARAPFIELDS_PG_handle(bpy.types.PropertyGroup):
         ),
         set=lambda entry, is_held: listeners["in_world"](entry, is_held),
     )
-    colour: colour("Colour of the handle's boxes in the viewport")
+    colour: colour("Color of the handle's boxes in the viewport")
     rest: bpy.props.FloatVectorProperty(
         size=16,
         name="Rest Box",

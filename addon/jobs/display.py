@@ -92,9 +92,9 @@ def draw(header, context):
     if job is None:
         return
     row, left = header.layout.row(align=True), job.remaining
-    row.label(text=job.message, translate=False)
-    text = f"{translated(job.title)} {job.fraction:.0%}"
+    text = f"{translated(job.title)}: {job.message}"
     if left is not None:
         text += translated(", about {seconds} s left", seconds=f"{left:.0f}")
-    row.progress(factor=job.fraction, text=text)
+    row.label(text=text, translate=False)
+    row.progress(factor=job.fraction, text=f"{job.fraction:.0%}")  # too narrow for words
     row.operator(Op.CANCEL, icon="X")

@@ -24,14 +24,14 @@ class ARAPFIELDS_OT_cancel(Guided, bpy.types.Operator):
         job = jobs.running()
         if job.elapsed < ASKS_AFTER or not has_window():
             return self.execute(context)
-        title = translated("Cancel {job} at {done}?", job=translated(job.title), done=f"{job.fraction:.0%}")
+        title = translated("Stop {job} at {done}?", job=translated(job.title), done=f"{job.fraction:.0%}")
         text = translated("Nothing of it would be kept")
         return context.window_manager.invoke_confirm(
             self,
             event,
             title=title,
             message=text,
-            confirm_text=translated("Cancel {job}", job=translated(job.title)),
+            confirm_text=translated("Stop {job}", job=translated(job.title)),
         )
 
     def execute(self, context):

@@ -45,7 +45,7 @@ def apply(context, source, pose, strength):
     with modifier_stack.evaluated_mesh(context, source, in_place=True) as mesh:
         points, has_free_normals = positions(mesh), bool(modifier_stack.free_normals(mesh))
     if not len(points) or not np.isfinite(points).all():
-        raise UserError("{name} has no points, or some that are not finite", source)
+        raise UserError("{name} has no points, or some at invalid locations", source)
     rest = pose.to_solve(points)
     try:
         posed = pose.field.apply(rest)

@@ -28,7 +28,7 @@ quality = partial(
     choice,
     QUALITY_ITEMS,
     "Quality",
-    "Sets the iterations and the network's size",
+    "How finely the surface is fitted, and how long that takes",
     **({"default": "GOOD"} if QUALITY_ITEMS else {}),
 )
 style = partial(choice, STYLE_ITEMS, "Style", "The solid whose faces the surface turns towards")
@@ -38,7 +38,7 @@ surface = partial(
     choice,
     SURFACES,
     "Surface",
-    "What the implicit surface is made of, which solves sample and new meshes show",
+    "What the implicit surface is made of, which new meshes show",
 )
 result = partial(choice, RESULT_ITEMS, "Store As", "Where the result goes", default="MODIFIER")
 

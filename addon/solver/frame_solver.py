@@ -471,7 +471,7 @@ def moved_to(handle, target):
 
 def require_finite(points):
     if not np.isfinite(points).all():
-        raise UserError("The shape has vertices that are NaN or infinite; move the handles less far")
+        raise UserError("The shape has vertices at invalid locations; move the handles less far")
     return points
 
 

@@ -5,7 +5,7 @@ import bpy
 
 from ..blender.language import translated
 from ..blender.point_data import face_count, points_of
-from ..blender.section import Section, tasks_of, wrapped
+from ..blender.section import Section, tasks_of
 from ..blender.splat_layouts import holds_splats
 from ..names import TOOL, Op
 
@@ -30,8 +30,8 @@ class ARAPFIELDS_PT_tasks(Section, bpy.types.Panel):
     def fill(self, context, source, settings):
         layout = self.layout
         if source is not None:
-            text = counts_of(source)
-            wrapped(layout, f"{source.name}: {text}", icon="MESH_DATA")
+            text = f"{source.name}: {counts_of(source)}"
+            layout.label(text=text, icon="MESH_DATA", translate=False)  # one line, or the tasks would move
         if len(tasks_of(context)) > 1:
             layout.use_property_split = False
             layout.row(align=True).prop(context.scene.arapfields, "task", expand=True)

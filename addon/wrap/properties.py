@@ -85,7 +85,7 @@ def mix(**extra):
 class ARAPFIELDS_PG_landmark(bpy.types.PropertyGroup):
     rest: pointer(bpy.types.Object, "Landmark", "Empty on the object at rest")
     on_target: pointer(bpy.types.Object, "On the Target", "Empty where it belongs on the target")
-    colour: colour("Colour of the landmark in the viewport")
+    colour: colour("Color of the landmark in the viewport")
     left_out: flag("Left Out", "The last wrap left this pair out, as it contradicts the others")
 
 

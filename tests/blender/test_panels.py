@@ -281,7 +281,7 @@ def test_the_status_bar_shows_the_job_and_its_cancel():
     assert texts() == []
     undo = prepared("running")
     try:
-        assert texts() == ["Bar", "Deform 0%", "Cancel"]
+        assert texts() == ["Deform: Bar", "0%", "Cancel"]
     finally:
         undo()
     assert texts() == []

@@ -286,7 +286,7 @@ def test_an_earlier_bake_stays_where_one_fails(tmp_path):
     bpy.ops.arapfields.bake(filepath=path)
     before = {one.name: one.read_bytes() for one in tmp_path.iterdir()}
     assert sorted(before) == [f"walk.{frame:04d}.ply" for frame in (1, 2, 3)]
-    with pytest.raises(RuntimeError, match="overwrite=True"):
+    with pytest.raises(RuntimeError, match="Overwrite replaces it"):
         bpy.ops.arapfields.bake(filepath=path)
     with files_of_at_most(40_000), pytest.raises(RuntimeError, match="walk"):
         bpy.ops.arapfields.bake(filepath=path, overwrite=True)

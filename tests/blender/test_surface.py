@@ -207,7 +207,7 @@ BROKEN = {  # name → what the message says
     "empty": "Mesh: the mesh is empty",
     "one vertex": "Mesh: the mesh has no faces",
     "loose edges": "Mesh: the mesh has no faces",
-    "not finite": "Mesh: 1 vertices have no finite position, the first is 5",
+    "not finite": "Mesh: 1 vertices are at invalid locations, the first is 5",
     "flat object": "Mesh: its scale flattens it",
     "no handle": "Drag a pin or add a handle first",
     "handle outside": "No part of the surface lies in the rest region of Moving",

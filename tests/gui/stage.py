@@ -220,7 +220,7 @@ def as_at_first(first):
         bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
         eye = bpy.context.area.spaces.active.region_3d
         eye.view_perspective, eye.view_rotation = first
-        bpy.context.preferences.system.viewport_aa = "8"
+        bpy.context.preferences.system.viewport_aa = "OFF"  # drawing by the processor is slow
         if bpy.context.object and bpy.context.object.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         empty_file()

@@ -186,7 +186,7 @@ def space_of(matrix_world, name="object"):
     """The solve space of an object with this world matrix; UserError if its scale is singular."""
     world = np.asarray(matrix_world, dtype=np.float64)
     if not np.isfinite(world).all():
-        raise UserError("{name}: its world matrix is not finite", name=name)
+        raise UserError("{name}: its transform is not valid", name=name)
     left, scales, right = np.linalg.svd(world[:3, :3])
     if scales[-1] <= FLAT_SCALE_TOLERANCE * scales[0]:
         raise UserError("{name}: its scale flattens it; give every axis a scale other than zero", name=name)

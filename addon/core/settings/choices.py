@@ -48,7 +48,7 @@ SURFACES = (
     (
         "FIT",
         "Fit",
-        "A smooth surface that a network learns from the mesh, which also closes its holes; fitted first "
+        "A smooth surface that is fitted to the mesh, which also closes its holes; fitted first "
         "where it is out of date",
     ),
 )
@@ -136,7 +136,7 @@ RESULT_KINDS = (
 TRANSFERRED = (
     ("KEYS", "Shape Keys", "Each key of the object, turned and scaled as the wrap does, with its drivers"),
     ("GROUPS", "Vertex Groups", "Weights and groups; locked groups of the target stay"),
-    ("ATTRIBUTES", "Attributes", "Colours and other attributes of vertices and corners"),
+    ("ATTRIBUTES", "Attributes", "Colors and other attributes of vertices and face corners"),
     ("EDGES", "Seams and Creases", "Seams, sharp edges, creases and bevel weights, along the nearest edges"),
     (
         "ARMATURE",
