@@ -3,7 +3,8 @@
 
 import numpy as np
 import pytest
-from support.geometry.meshes import block_surface, sphere
+from support.geometry.blocks import block_surface
+from support.geometry.meshes import sphere
 
 import arapfields as af
 from addon.core.errors import UserError

@@ -34,8 +34,6 @@ pytestmark = pytest.mark.in_blender
 
 # Deforming inside Blender: what moves, what stays, in whichever space the object lives.
 
-ON_SOURCE = 2e-6  # single precision of positions of size one
-
 
 def test_the_moved_end_follows_and_the_held_end_stays():
     bar, _, moving = scenes.bar_with_handles()

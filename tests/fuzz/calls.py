@@ -8,7 +8,7 @@ import numpy as np
 
 import arapfields as af
 
-from .files import FLOATS, NUMBERS
+from .mutate import FLOATS, NUMBERS
 
 # Calls of the public interface with some invalid arguments, which must return a result or raise a
 # documented error.

@@ -4,10 +4,8 @@
 import sys
 from pathlib import Path
 
-import creatures
 import numpy as np
 import pytest
-import shapes
 import torch
 from support.geometry import cases, meshes
 from support.oracles import gradient_of, jacobians_of, jets_with_jacobians
@@ -18,6 +16,10 @@ import arapfields as af
 from arapfields._native import testing
 from arapfields.cli.files import read_mesh
 from arapfields.cli.handles import turn_upright
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender_scripts"))
+import creatures
+import shapes
 
 # stylize: the preference rises, strength 0 is the identity, weights and orientation act, errors name.
 
@@ -460,7 +462,6 @@ def test_a_cube_as_an_object_looks_like_the_preset(data_dir):
 
 # All styles of figures of our own at the defaults: they stand, and show the style.
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blender_scripts"))
 
 MOST_TILT = 5.0  # degrees
 MOST_UNEVEN = 0.02  # of the height, between feet that stood on a plane

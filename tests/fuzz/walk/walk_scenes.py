@@ -27,7 +27,6 @@ SMALL = {  # settings of each object, so that solves take milliseconds
     "fit": {"iterations": 8, "width": 8, "layers": 2, "near_points": 300, "uniform_points": 100},
     "bake": {"range": "CUSTOM", "start": 1, "end": 2},
 }
-POINTED = ("MESH", "CURVE", "CURVES", "LATTICE", "SURFACE", "POINTCLOUD")
 
 
 def small(item):
