@@ -175,7 +175,7 @@ def test_a_cache_plays_what_the_solver_says_at_every_frame():
     (modifier,) = bar.modifiers
     assert modifier.type == "MESH_CACHE" and modifier.filepath == "//cache/scene~Scene~Bar.pc2"
     shown = drawn()["ARAPFIELDS_PT_animation"]
-    assert "ARAP Fields Cache" in shown and "250 samples, 1.2 MB" in shown, shown
+    assert "ARAP Fields Cache" in shown and "250 shapes, 1.2 MB" in shown, shown
     for frame in (1, 2.5, 4, 5):
         assert np.abs(at(bar, frame) - solved(bar, frame)).max() <= EXACT, frame
     assert np.abs(at(bar, 9) - at(bar, 5)).max() == 0

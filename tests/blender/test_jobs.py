@@ -163,7 +163,7 @@ def test_a_job_of_long_standing_asks_before_it_is_thrown_away():
         context = SimpleNamespace(window_manager=Confirm())
         assert invoke(context, None) == {"FINISHED"} and not asked
         job._begin -= job_operators.ASKS_AFTER
-        assert invoke(context, None) == {"RUNNING_MODAL"} and asked == ["Cancel Bake at 0%?"]
+        assert invoke(context, None) == {"RUNNING_MODAL"} and asked == ["Stop Bake at 0%?"]
     finally:
         job_operators.has_window = kept
         jobs.stop()
