@@ -83,6 +83,20 @@ def test_install_use_and_remove(extension, blender, torch):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("blender", blenders.VERSIONS, indirect=True)
+def test_an_enabled_extension_is_upgraded(extension, blender):
+    """Over itself, in use, and in the next start; after its removal the next start knows nothing of it."""
+    for script, order in (
+        ("upgraded", extension),
+        ("upgraded", "used"),
+        ("installed", extension),
+        ("upgraded", "gone"),
+    ):
+        done = blender.run(f"{script}.py", order)
+        assert ("UPGRADED" if script == "upgraded" else "USED") in done.stdout
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("blender", blenders.NAMES, indirect=True)
 def test_carried_objects_of_all_kinds(extension, blender):
     done = blender.run("installed_carried.py", blender.inside(blender.bring(extension)))

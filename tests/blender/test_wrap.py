@@ -778,3 +778,69 @@ def test_a_second_run_moves_the_first_ones_copies_and_another_field_is_refused(t
     scenes.activate(shirt, body)
     with pytest.raises(RuntimeError, match="needs the extension"):
         bpy.ops.arapfields.refit(field=str(tmp_path / "a.txt"))
+
+
+# An outfit of one of our figures on two others: a twin, whose hand-made outfit is known, and the grown-up.
+
+HAND_MADE = 0.03  # of the twin's size: most difference of keys
+
+
+def worn_over(child, name, part, bones, loose=0.02):
+    """A garment at a distance from the child's skin where `part` holds, with weights of bones and a key."""
+    skin, normals = points_of_mesh(child.data), mesh_arrays.vectors(child.data.vertices, "normal")
+    triangles = mesh_arrays.triangles(child.data)
+    triangles = triangles[part(skin)[triangles].all(axis=1)]
+    used, flat = np.unique(triangles, return_inverse=True)
+    item = mesh_object(name, (skin + loose * normals)[used], flat.reshape(-1, 3))
+    character.weigh(item, bones)
+    item.shape_key_add(name="Basis")
+    key = item.shape_key_add(name="Long")
+    mesh_arrays.put_vectors(key.data, longer(points_of_mesh(item.data)), "co")
+    return item
+
+
+def points_of_mesh(mesh):
+    return mesh_arrays.vectors(mesh.vertices, "co").astype(float)
+
+
+def weights_of(item):
+    return [{one.group: one.weight for one in vertex.groups} for vertex in item.data.vertices]
+
+
+@pytest.mark.slow  # two wraps by their defaults
+def test_an_outfit_of_one_figure_fits_two_others(tmp_path):
+    import people
+
+    shape = people.body()
+    child = people.coloured("Child", shape)
+    twin = people.coloured("Twin", shape._replace(vertices=mapped(shape.vertices)))
+    grown = people.coloured("Grown-up", people.adult_body())
+    twin.location.x, grown.location.x = -2.5, 2.5
+    parts = {
+        "Shirt": lambda p: (p[:, 2] > 0.66) & (p[:, 2] < 1.165) & (np.abs(p[:, 0]) < 0.4),
+        "Trousers": lambda p: (p[:, 2] > 0.14) & (p[:, 2] < 0.72),
+        "Cap": lambda p: p[:, 2] > 1.6,
+    }
+    outfit = [worn_over(child, name, part, people.BONES) for name, part in parts.items()]
+    bpy.context.view_layer.update()
+    for other in (twin, grown):
+        child.arapfields.wrap.onto = other
+        child.arapfields.wrap.landmarks.clear()
+        for rest, there in people.PAIRS:
+            goal = mapped([rest])[0] if other is twin else np.array(there)
+            landmarks.add(bpy.context, child, other, (np.array(rest), goal + other.location))
+        field, written = tmp_path / f"{other.name}.safetensors", set()
+        for item in outfit:
+            scenes.activate(item, child)
+            assert bpy.ops.arapfields.refit(field=str(field)) == {"FINISHED"}
+            written.add(field.stat().st_mtime_ns)
+            copied = bpy.data.objects[f"{item.name} {other.name}"]
+            assert (inside(other, copied) > 0).all(), (other.name, item.name)
+            assert weights_of(copied) == weights_of(item)
+            if other is twin:
+                size = np.linalg.norm(np.ptp(scenes.world_points(twin), axis=0))
+                rest, (basis, key) = points_of_mesh(item.data), copied.data.shape_keys.key_blocks
+                way = (points_of(key) - points_of(basis)) @ np.array(matrix_of(copied))[:3, :3].T
+                off = np.linalg.norm(way - (mapped(longer(rest)) - mapped(rest)), axis=1)
+                assert off.max() < HAND_MADE * size, (item.name, off.max() / size)
+        assert len(written) == 1  # the first garment's wrap serves the others

@@ -54,7 +54,7 @@ def rendered(path):
     if scene.camera is None:
         scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
         scene.collection.objects.link(scene.camera)
-        scene.camera.location = (0, 0, 3.2)
+        scene.camera.location, scene.camera.rotation_euler = (0, -4.5, 0.2), (np.pi / 2, 0, 0)
         scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 64, False
         scene.render.resolution_x, scene.render.resolution_y = 240, 160
     scene.render.filepath = str(path)
