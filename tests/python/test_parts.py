@@ -301,7 +301,7 @@ def stacked_boxes(count=4):
     vertices, triangles = meshes.box((0.5, 0.3, 0.3))
     for _ in range(2):
         vertices, triangles = meshes.subdivide(vertices, triangles)
-    return meshes.together(*((vertices + (i, 0, 0), triangles) for i in range(count)))
+    return meshes.together(*((vertices + np.array([i, 0, 0]), triangles) for i in range(count)))
 
 
 @pytest.mark.parametrize("corners", ["shared", "one a triangle"])
