@@ -5,16 +5,18 @@ import numpy as np
 import pytest
 from support.geometry import meshes
 from support.geometry.cases import bar_handles, bar_samples, moved, shift, turn
-from support.geometry.meshes import BOTTOM, LEG, LEGS, TIP, fork_samples, handle_box
+from support.geometry.meshes import BEND, BOTTOM, LEG, LEGS, TIP, fork_samples, handle_box
 
 import arapfields as af
 
 SIZE = 2 * LEG  # of the fork, about
 LESS = 0.15  # of its way without locality: how far the other leg moves
 RIGID = 1e-3  # of the size
+FARTHER = 0.05  # of the size: where one handle differs
 WEIGHT = af.DeformOptions().locality
 DEFORM = dict(centers=300, locality=WEIGHT)
 MIDDLE = BOTTOM @ np.diag([0.2, 1, 1, 1])  # of the bend
+MIDWAY = handle_box([-BEND, 0, 0.4 * LEG], [0.2, 0.2, 0.2])  # of the other leg
 BENT = turn([1, 0, 0], 40, (0, 0, 0.3))
 
 
@@ -61,6 +63,20 @@ def test_one_motion_of_all_handles_carries_the_whole(samples, solve, far):
     field = solve(samples, [moved(BOTTOM, motion), moved(TIP, motion)])
     expected = samples.points @ motion[:3, :3].T + motion[:3, 3]
     assert np.abs(field(samples.points) - expected).max() < RIGID * SIZE
+
+
+@SOLVES
+@pytest.mark.parametrize("far", [0.02, 0.1, 2.0])
+def test_of_four_handles_the_one_that_differs_moves_its_leg_alone(samples, solve, far):
+    motion = turn([1, 2, 0], 100 * far, (0, 0.2, 0.1)) @ shift([0.3 * far * SIZE, far * SIZE, 0])
+    mirrored = np.diag([-1.0, 1, 1, 1])
+    shared = [moved(box, motion) for box in (BOTTOM, mirrored @ TIP @ mirrored, MIDWAY)]
+    field = solve(samples, [*shared, moved(TIP, motion @ shift([0, FARTHER * SIZE, 0]))])
+    expected = samples.points @ motion[:3, :3].T + motion[:3, 3]
+    off = np.linalg.norm(field(samples.points) - expected, axis=1)
+    on_its_side = samples.points[:, 0] > 0
+    assert off[on_its_side].max() > 0.9 * FARTHER * SIZE
+    assert off[~on_its_side].max() < RIGID * SIZE
 
 
 @SOLVES
