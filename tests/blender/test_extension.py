@@ -85,12 +85,12 @@ def test_install_use_and_remove(extension, blender, torch):
 @pytest.mark.slow
 @pytest.mark.parametrize("blender", blenders.VERSIONS, indirect=True)
 def test_an_enabled_extension_is_upgraded(extension, blender):
-    """Over itself, in use, and in the next start; after its removal the next start knows nothing of it."""
+    """After its removal the next start knows nothing of it; over itself, in use, and in the next start."""
     for script, order in (
-        ("upgraded", extension),
-        ("upgraded", "used"),
         ("installed", extension),
         ("upgraded", "gone"),
+        ("upgraded", extension),
+        ("upgraded", "used"),
     ):
         done = blender.run(f"{script}.py", order)
         assert ("UPGRADED" if script == "upgraded" else "USED") in done.stdout
