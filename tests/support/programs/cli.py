@@ -65,8 +65,7 @@ def wait_until_loaded(running):
 
 
 def wait_until_at_work(running):
-    """Waits until a process has loaded the library and used as much processor time since as a cold start takes,
-    libtorch's own loading included."""
+    """Waits until a process has loaded the library and used more processor time since than a start takes."""
     wait_until_loaded(running)
     stat = Path(f"/proc/{running.pid}/stat")
     if not stat.exists():
