@@ -15,6 +15,9 @@ namespace {
 /// it comes from, nor another one in the same place.
 constexpr double below_own_face = 1e-7;
 
+/// Depth, in sizes of the mesh, at which the piece of a point is looked for, where pieces may touch.
+constexpr double inside_own_piece = 1e-6;
+
 /// Points on one sheet see each other around its bends if they are nearer than so many of their depths, their
 /// normals are alike or opposite (least cosine), and the ways to the place between them are free, halved so
 /// often.
@@ -33,16 +36,29 @@ InsideSight::InsideSight(const TriangleMesh& mesh, const Frame& frame, const Pro
     triangle_normals_.row(t) =
         (corner(1) - corner(0)).cross(corner(2) - corner(0)).stableNormalized().transpose();
   }
-  is_one_piece_ = std::all_of(piece_of_triangle_.begin(), piece_of_triangle_.end(),
-                              [&](std::int32_t piece) { return piece == piece_of_triangle_.front(); });
+  if (std::all_of(piece_of_triangle_.begin(), piece_of_triangle_.end(),
+                  [&](std::int32_t piece) { return piece == piece_of_triangle_.front(); }))
+    return;
+  // Each triangle a little inside its own piece.
+  const Points cube = frame.to_cube(mesh.vertices);
+  Points corners(mesh.triangles.size(), 3);
+  Triangles rows(mesh.triangles.rows(), 3);
+  for (Index t = 0; t < rows.rows(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      rows(t, k) = static_cast<std::int32_t>(3 * t + k);
+      corners.row(rows(t, k)) =
+          cube.row(mesh.triangles(t, k)) - inside_own_piece * size_ * triangle_normals_.row(t);
+    }
+  inner_triangles_ = std::make_shared<const SignedDistance>(std::move(corners), std::move(rows), progress);
 }
 
 InsideSight::Eyes InsideSight::below(PointsIn points, PointsIn normals, const Vector& depths) const {
   Eyes result{points, normals, depths, {}};
-  if (is_one_piece_)
+  if (inner_triangles_ == nullptr)
     result.pieces.assign(static_cast<std::size_t>(points.rows()), piece_of_triangle_.front());
   else
-    for (const std::int32_t triangle : distance_.closest(points).triangles)
+    for (const std::int32_t triangle :
+         inner_triangles_->closest(points - 2.0 * inside_own_piece * size_ * normals).triangles)
       result.pieces.push_back(piece_of_triangle_[static_cast<std::size_t>(triangle)]);
   const double start = below_own_face * size_;
   const Points from = points - start * normals;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -46,8 +47,8 @@ class ARAPFIELDS_EXPORT_TO_TESTS InsideSight {
   SignedDistance distance_;
   Points triangle_normals_;
   std::vector<std::int32_t> piece_of_triangle_;
-  bool is_one_piece_ = true;
-  double size_ = 1.0;  // of the mesh in the cube
+  std::shared_ptr<const SignedDistance> inner_triangles_;  // null: there is one piece
+  double size_ = 1.0;                                      // of the mesh in the cube
 };
 
 }  // namespace arapfields

@@ -13,6 +13,7 @@
 #include "core/parallel.h"
 #include "fields/interior_embedding_kernel.h"
 #include "fields/radial_basis.h"
+#include "mesh/is_closed.h"
 #include "mesh/outward_triangles.h"
 #include "sampling/nearest_sample.h"
 
@@ -528,6 +529,19 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& outward
         }
       }
     }
+  }
+  // Vertices in one place, as along a seam, lie on one side if theirs see each other.
+  if (near.empty()) return result;
+  const std::vector<std::int32_t> first = first_at_position(outward.vertices);
+  std::vector<std::vector<SurfaceSide>> sides_at(result.size());
+  for (const Index v : near) {
+    std::vector<SurfaceSide>& known = sides_at[static_cast<std::size_t>(first[v])];
+    const auto seen = std::find_if(known.begin(), known.end(),
+                                   [&](SurfaceSide side) { return !sight->hides(side, result[v]); });
+    if (seen != known.end())
+      result[v] = *seen;
+    else
+      known.push_back(result[v]);
   }
   return result;
 }

@@ -87,7 +87,7 @@ struct ARAPFIELDS_EXPORT InteriorEmbedding {
   std::vector<SurfaceSide> sides_of(PointsIn points, PointsIn normals, const InsideSight& mesh,
                                     std::vector<Index>* doubtful = nullptr) const;
   /// The same of a mesh's vertices, in mesh coordinates; `frame` is that of the nodes' cube. The ends of a
-  /// short edge lie on sides that see each other, so that no such edge is torn.
+  /// short edge lie on sides that see each other, so that no such edge is torn, nor a seam of vertices.
   std::vector<SurfaceSide> sides_of(const TriangleMesh& mesh, const Frame& frame) const;
   /// The same for a mesh whose triangles face outwards.
   std::vector<SurfaceSide> sides_of(const TriangleMesh& outward, const Frame& frame, const InsideSight& sight,

@@ -145,6 +145,15 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
   double area = 0.0, turned_area = 0.0, largest_turned = 0.0, smallest = 0.0;
   WrongPlaces wrong(limits);
   std::vector<Index> changed;
+  Index last_folded = -1;
+  const auto fold_at = [&](Index t, double determinant, const Vec3& place) {
+    if (result.folded == 0 || determinant < smallest) {
+      smallest = determinant;
+      result.folded_place = place;
+    }
+    result.folded += t != last_folded;
+    last_folded = t;
+  };
   for (Index t = 0; t < count; ++t) {
     bool changes = false;
     Vec3 rest[3], now[3];
@@ -170,10 +179,7 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
     wrong.look_at(jacobian, middles.row(t).transpose(), before);
     const double determinant = jacobian.determinant();
     if (!(determinant > 0.0)) {
-      if (result.folded++ == 0 || determinant < smallest) {
-        smallest = determinant;
-        result.folded_place = middles.row(t).transpose();
-      }
+      fold_at(t, determinant, middles.row(t).transpose());
       continue;
     }
     // Normals move by the cofactors of J.
@@ -202,7 +208,10 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
     for (Index i = 0; i < corners.rows(); ++i) {
       const Index t = changed[static_cast<std::size_t>(i / 3)];
       const Vec3 first = corner(looked.vertices, looked.triangles, t, 0);
-      wrong.look_at(jacobian_at(at_corners.view(), i), corners.row(i).transpose(),
+      const Mat3 jacobian = jacobian_at(at_corners.view(), i);
+      if (jacobian_at(jets.view(), t).determinant() > 0.0 && !(jacobian.determinant() > 0.0))
+        fold_at(t, jacobian.determinant(), corners.row(i).transpose());
+      wrong.look_at(jacobian, corners.row(i).transpose(),
                     (corner(looked.vertices, looked.triangles, t, 1) - first)
                         .cross(corner(looked.vertices, looked.triangles, t, 2) - first));
     }
@@ -214,7 +223,7 @@ MeshMeasures measure_triangles(const DeformationField& field, const TriangleMesh
 std::vector<std::string> warnings_on(const MeshMeasures& measures) {
   std::vector<std::string> warnings;
   if (measures.folded > 0)
-    warnings.push_back("the field folds at the middles of " + std::to_string(measures.folded) + " of " +
+    warnings.push_back("the field folds at " + std::to_string(measures.folded) + " of " +
                        std::to_string(measures.measured) + " triangles, the worst at " +
                        place_text(measures.folded_place));
   if (measures.has_long_triangles())

@@ -28,8 +28,8 @@ struct MeshMeasures {
   static constexpr Index most_measured = 20'000, most_wrong = 2000;
   Distortion distortion;  ///< at the triangles' middles, and near the corners of those that change much
   Index measured = 0;     ///< triangles
-  Index folded = 0;       ///< of them, those with det J ≤ 0 at their middles
-  Vec3 folded_place = Vec3::Zero();  ///< the middle with the smallest det J, in mesh coordinates at rest
+  Index folded = 0;       ///< of them, those with det J ≤ 0 at a place that was looked at
+  Vec3 folded_place = Vec3::Zero();  ///< the one with the smallest det J, in mesh coordinates at rest
   Index turned = 0;  ///< of them, those whose corners turn it over where the field itself does not fold
   double turned_share = 0.0;          ///< of the measured area
   Vec3 turned_place = Vec3::Zero();   ///< middle of the largest of them, in mesh coordinates at rest

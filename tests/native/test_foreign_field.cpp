@@ -11,6 +11,7 @@
 #include "extraction/extract_deformed.h"
 #include "fields/inverse.h"
 #include "neural/neural_sdf.h"
+#include "solve/mesh_measures.h"
 
 using namespace arapfields;
 
@@ -106,6 +107,26 @@ SurfaceSamples plate_of(Index side) {
   return plate;
 }
 
+/// Stretches x, and z by x − `from`: det J is 2 (x − from).
+class Wedge final : public DeformationField {
+ public:
+  explicit Wedge(double from) : from_(from) {}
+
+  void evaluate(PointsIn points, JetView<double> out) const override {
+    for (Index p = 0; p < points.rows(); ++p) {
+      const double x = points(p, 0), z = points(p, 2);
+      Eigen::Map<Vec3>(out.at(0, p)) = Vec3(2.0 * x, points(p, 1), z * (x - from_));
+      if (out.order == JetOrder::value) continue;
+      Eigen::Map<Vec3>(out.at(first_column(0), p)) = Vec3(2.0, 0.0, z);
+      Eigen::Map<Vec3>(out.at(first_column(1), p)) = Vec3(0.0, 1.0, 0.0);
+      Eigen::Map<Vec3>(out.at(first_column(2), p)) = Vec3(0.0, 0.0, x - from_);
+    }
+  }
+
+ private:
+  double from_;
+};
+
 }  // namespace
 
 BOOST_AUTO_TEST_CASE(clothes_keep_their_place_above_the_surface_whatever_the_field_is_beside_it) {
@@ -159,6 +180,20 @@ BOOST_AUTO_TEST_CASE(newtons_method_inverts_it) {
   const InverseResult back = invert(roll, images);
   BOOST_TEST(back.failures == 0);
   BOOST_TEST((back.points - points).rowwise().norm().maxCoeff() < 1e-6);
+}
+
+BOOST_AUTO_TEST_CASE(a_fold_near_a_corner_alone_is_told) {
+  TriangleMesh mesh{Points(4, 3), Triangles(2, 3)};
+  mesh.vertices << 0, 0, 0, 1, 0, 0, 1, 1, 0, 0.5, 1, 0;
+  mesh.triangles << 0, 1, 2, 1, 2, 3;
+  const MeshMeasures found = measure_triangles(Wedge(0.1), mesh);
+  BOOST_TEST(found.folded == 1);
+  BOOST_TEST(found.folded_place[0] < 0.1);
+  BOOST_TEST(found.distortion.min_determinant == 2.0 * (found.folded_place[0] - 0.1),
+             boost::test_tools::tolerance(1e-12));
+  BOOST_TEST(warnings_on(found).size() == 1);
+  BOOST_TEST(measure_triangles(Wedge(0.7), mesh).folded == 2);  // the middle of one, a corner of the other
+  BOOST_TEST(warnings_on(measure_triangles(Wedge(-0.1), mesh)).empty());
 }
 
 BOOST_AUTO_TEST_SUITE_END()
