@@ -31,13 +31,12 @@ struct EdgePassage {
 /// first of them.
 class EdgePassages {
  public:
-  EdgePassages(PointsIn vertices, TrianglesIn triangles) {
-    const std::vector<std::int32_t> first = first_at_position(vertices);
-    begin_.assign(first.size() + 1, 0);
+  EdgePassages(PointsIn vertices, TrianglesIn triangles) : first_(first_at_position(vertices)) {
+    begin_.assign(first_.size() + 1, 0);
     const auto each_passage = [&](auto&& visit) {
       each_in_order(triangles.rows(), [&](Index t) {
         for (int k = 0; k < 3; ++k) {
-          const std::int32_t a = first[triangles(t, k)], b = first[triangles(t, (k + 1) % 3)];
+          const std::int32_t a = first_[triangles(t, k)], b = first_[triangles(t, (k + 1) % 3)];
           if (a != b) visit(std::min(a, b), EdgePassage{std::max(a, b), static_cast<std::int32_t>(t), a < b});
         }
       });
@@ -47,11 +46,15 @@ class EdgePassages {
     passages_.resize(begin_.back());
     std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
     each_passage([&](std::size_t low, EdgePassage passage) { passages_[next[low]++] = passage; });
-    each_in_order(std::ssize(first), [&](Index low) {
+    each_in_order(std::ssize(first_), [&](Index low) {
       std::stable_sort(passages_.begin() + begin_[low], passages_.begin() + begin_[low + 1],
                        [](const EdgePassage& a, const EdgePassage& b) { return a.high < b.high; });
     });
   }
+
+  /// For each vertex (n) the first at the same position.
+  const std::vector<std::int32_t>& first() const { return first_; }
+
   /// visit(low, from, to) for each edge: its lower vertex, and its passages in the order of triangles.
   template <class Visit>
   void each_edge(const Visit& visit) const {
@@ -67,6 +70,7 @@ class EdgePassages {
   }
 
  private:
+  std::vector<std::int32_t> first_;
   std::vector<std::uint32_t> begin_;  // of the passages of each lower vertex
   std::vector<EdgePassage> passages_;
 };

@@ -2,11 +2,11 @@
 #include "mesh/is_closed.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <vector>
 
 #include "core/parallel.h"
+#include "mesh/edge_passages.h"
 
 namespace arapfields {
 namespace {
@@ -41,36 +41,12 @@ std::vector<std::int32_t> first_at_position(PointsIn vertices) {
 }
 
 bool is_closed(PointsIn vertices, TrianglesIn triangles) {
-  const std::vector<std::int32_t> first = first_at_position(vertices);
-  // Passages of undirected edges, +1 upwards and −1 downwards, gathered by the edge's lower vertex.
-  struct Passage {
-    std::int32_t high, direction;
-  };
-  std::vector<std::uint32_t> begin(vertices.rows() + 1, 0);
-  const auto each_edge = [&](auto&& visit) {
-    for (Index t = 0; t < triangles.rows(); ++t)
-      for (int k = 0; k < 3; ++k) {
-        const std::int32_t a = first[triangles(t, k)];
-        const std::int32_t b = first[triangles(t, (k + 1) % 3)];
-        if (a != b) visit(std::min(a, b), Passage{std::max(a, b), a < b ? 1 : -1});
-      }
-  };
-  each_edge([&](std::size_t low, Passage) { ++begin[low + 1]; });
-  for (std::size_t i = 1; i < begin.size(); ++i) begin[i] += begin[i - 1];
-  std::vector<Passage> passages(begin.back());
-  std::vector<std::uint32_t> next(begin.begin(), begin.end() - 1);
-  each_edge([&](std::size_t low, Passage passage) { passages[next[low]++] = passage; });
-  for (std::size_t i = 0; i + 1 < begin.size(); ++i) {
-    const auto from = passages.begin() + begin[i], to = passages.begin() + begin[i + 1];
-    std::sort(from, to, [](const Passage& a, const Passage& b) { return a.high < b.high; });
-    for (auto p = from; p != to;) {
-      std::int64_t sum = 0;
-      const std::int32_t high = p->high;
-      for (; p != to && p->high == high; ++p) sum += p->direction;
-      if (sum != 0) return false;
-    }
-  }
-  return true;
+  bool closed = true;
+  EdgePassages(vertices, triangles).each_edge([&](std::int32_t, auto from, auto to) {
+    const auto upwards = std::count_if(from, to, [](const EdgePassage& passage) { return passage.upwards; });
+    closed &= 2 * upwards == to - from;
+  });
+  return closed;
 }
 
 }  // namespace arapfields

@@ -54,7 +54,8 @@ std::vector<std::int32_t> pieces_of(const TriangleMesh& mesh) {
   const Index count = mesh.triangles.rows();
   UnionFind joined(count);
   std::vector<bool> open(static_cast<std::size_t>(count));  // at a boundary
-  EdgePassages(mesh.vertices, mesh.triangles).each_edge([&](std::int32_t low, auto from, auto to) {
+  const EdgePassages passages(mesh.vertices, mesh.triangles);
+  passages.each_edge([&](std::int32_t low, auto from, auto to) {
     const auto upwards = std::count_if(from, to, [](const EdgePassage& p) { return p.upwards; });
     if (to - from == 2 || 2 * upwards != to - from) {
       for (auto p = from; p != to; ++p) {
@@ -82,12 +83,11 @@ std::vector<std::int32_t> pieces_of(const TriangleMesh& mesh) {
   for (std::int32_t t = 0; t < count; ++t)
     if (open[static_cast<std::size_t>(t)]) is_open[static_cast<std::size_t>(joined.find(t))] = true;
   std::vector<std::int32_t> at_vertex(static_cast<std::size_t>(mesh.vertices.rows()), -1);
-  const std::vector<std::int32_t> first = first_at_position(mesh.vertices);
   for (std::int32_t t = 0; t < count; ++t) {
     const std::int32_t piece = joined.find(t);
     if (!is_open[static_cast<std::size_t>(piece)]) continue;
     for (int k = 0; k < 3; ++k) {
-      std::int32_t& other = at_vertex[static_cast<std::size_t>(first[mesh.triangles(t, k)])];
+      std::int32_t& other = at_vertex[static_cast<std::size_t>(passages.first()[mesh.triangles(t, k)])];
       if (other >= 0)
         joined.join(other, t);
       else

@@ -55,9 +55,7 @@ std::vector<double> radii_of(const Skeleton& skeleton, const SignedDistance& sur
 /// The distance of a point from a bone. The rig's own parts of it may end before the tail, where the nodes of
 /// the whole are too far apart to enclose it.
 double distance_to(const Bone& bone, const Vec3& point) {
-  const Vec3 along = bone.tail - bone.head;
-  const double share = std::clamp(along.dot(point - bone.head) / along.squaredNorm(), 0.0, 1.0);
-  return (bone.head + share * along - point).norm();
+  return (closest_on({bone.head, bone.tail}, point).first - point).norm();
 }
 
 /// The distance between the outer halves of two bones.

@@ -46,14 +46,6 @@ void require_bones(const std::vector<Bone>& bones) {
   }
 }
 
-/// The point of a part closest to another, and its parameter, 0 at the start and 1 at the end.
-std::pair<Vec3, double> closest_on(const BonePart& part, const Vec3& point) {
-  const Vec3 along = part.end - part.start;
-  const double square = along.squaredNorm();
-  const double t = square > 0.0 ? std::clamp((point - part.start).dot(along) / square, 0.0, 1.0) : 0.0;
-  return {part.start + t * along, t};
-}
-
 /// Whether a bone begins apart from its parent's tail and is exactly as long.
 bool copies_length(const Bone& bone, const Bone& parent) {
   const double length = (parent.tail - parent.head).norm();
@@ -62,6 +54,13 @@ bool copies_length(const Bone& bone, const Bone& parent) {
 }
 
 }  // namespace
+
+std::pair<Vec3, double> closest_on(const BonePart& part, const Vec3& point) {
+  const Vec3 along = part.end - part.start;
+  const double square = along.squaredNorm();
+  const double t = square > 0.0 ? std::clamp((point - part.start).dot(along) / square, 0.0, 1.0) : 0.0;
+  return {part.start + t * along, t};
+}
 
 std::vector<std::pair<Index, Index>> coincident_bones(const std::vector<Bone>& bones) {
   require_bones(bones);

@@ -34,6 +34,9 @@ struct BonePart {
   Vec3 end;
 };
 
+/// The point of a part closest to another, and its parameter, 0 at the start and 1 at the end.
+std::pair<Vec3, double> closest_on(const BonePart& part, const Vec3& point);
+
 /// The deforming bones that lie where another does, as control bones do, and the one that they lie at. This
 /// is the one nearest to its parent, of several the first.
 ARAPFIELDS_EXPORT std::vector<std::pair<Index, Index>> coincident_bones(const std::vector<Bone>& bones);
