@@ -14,7 +14,7 @@ import numpy as np
 import arapfields as af
 
 from . import shapes
-from .peer import compared, theirs
+from .peer import compared, theirs, yardstick
 from .peer.theirs import Refused, awkward, of_figures
 
 # Of the processor, for each training of implicit-arap; 0 is its own settings. Its own 1,000 steps run to the
@@ -146,7 +146,7 @@ def constraint_rows(problem, checkout):
             "by": name,
             "vertices": len(problem.vertices),
             "cpu_s": round(seconds, 2),
-            **theirs.measured(problem, moved),
+            **yardstick.measured(problem, moved),
             **(fingers(problem, moved) if problem.shape == "hand" else {}),
             "said": told,
         }
@@ -168,7 +168,7 @@ def verdict(problem, call):
         return f"refused: {lines[-1][:90]}"
     if not np.isfinite(moved).all():
         return "not finite"
-    measured = theirs.measured(problem, moved)
+    measured = yardstick.measured(problem, moved)
     if measured["handle_error_percent"] > 2:
         return f"handles missed by {measured['handle_error_percent']:.0f} %"
     crack = widest_crack(problem.vertices, moved) / np.ptp(problem.vertices[:, 2])

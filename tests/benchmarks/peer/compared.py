@@ -12,7 +12,7 @@ from scipy.spatial.distance import cdist
 import arapfields as af
 
 from .. import shapes
-from . import theirs
+from . import theirs, yardstick
 
 # A dog wrapped onto a twin that a known map bends and swells, beside coherent point drift of pycpd.
 #
@@ -134,7 +134,7 @@ def row(module, name, vertices, triangles, style):
     preferred = af.preferred_normals(style)
 
     def styled(moved):
-        return theirs.styled(vertices, triangles, moved, preferred)
+        return yardstick.styled(vertices, triangles, moved, preferred)
 
     moved, seconds, _ = theirs.gauss(module, vertices, triangles, preferred, LAMBDA, "styles")
     field, finished, own_seconds = ours(vertices, triangles, style)
