@@ -14,7 +14,7 @@ if IN_BLENDER:
 
     from addon.live import live_solver, sessions
     from addon.pin_tool import drag
-    from tests.fuzz.walk import walk_scenes
+    from tests.blender.walk import world
 
 pytestmark = pytest.mark.in_blender
 
@@ -38,7 +38,7 @@ def few_centers(test):
 
     @functools.wraps(test)
     def wrapped(*given, **named):
-        end = walk_scenes.few_centers()
+        end = world.few_centers()
         try:
             test(*given, **named)
         finally:
@@ -51,11 +51,11 @@ def build():
     bpy.context.preferences.edit.use_global_undo = True
     bpy.context.preferences.edit.undo_steps = 64
     for number, kind in enumerate(("MIRROR", "SUBSURF", None)):
-        bar = walk_scenes.bar(np.random.default_rng(0), f"Bar{number}", (0, 3 * number, 0), handles=False)
+        bar = world.bar(np.random.default_rng(0), f"Bar{number}", (0, 3 * number, 0), handles=False)
         if kind is not None:
             bar.modifiers.new(kind.title(), kind)
             bpy.context.view_layer.update()
-        walk_scenes.give_handles(bar)
+        world.give_handles(bar)
     scenes.bar("Die").location.x = 5
     bpy.context.view_layer.update()
 
@@ -98,9 +98,9 @@ def test_undo_meets_no_reference_to_what_is_gone(walk):
         else:
             take(step[:-1], bpy.data.objects[f"Bar{step[-1]}"])
             bpy.ops.ed.undo_push(message=step)  # what timers do comes after the step
-        assert not walk_scenes.dangling()
-        walk_scenes.settle()
-        assert not walk_scenes.dangling()
+        assert not world.dangling()
+        world.settle()
+        assert not world.dangling()
 
 
 @few_centers
@@ -110,16 +110,16 @@ def test_live_mode_that_ended_by_an_error_comes_back_by_undo():
     bar = bpy.data.objects["Bar2"]
     take("live", bar)
     bpy.ops.ed.undo_push(message="live")
-    walk_scenes.settle()
+    world.settle()
     shown = scenes.world_points(bar)
     for empty in [entry.empty for entry in bar.arapfields.handles]:
         bpy.data.objects.remove(empty)
     bpy.ops.ed.undo_push(message="deleted")
-    walk_scenes.settle()
+    world.settle()
     assert not sessions.live and not bar.arapfields.live_kind
     for _ in range(2):
         bpy.ops.ed.undo()
-        walk_scenes.settle()
+        world.settle()
     bar = bpy.data.objects["Bar2"]
     assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
 
@@ -131,14 +131,14 @@ def test_a_live_object_of_its_own_comes_back_by_undo():
     take("new", bar)
     take("live", bar)
     bpy.ops.ed.undo_push(message="live")
-    walk_scenes.settle()
+    world.settle()
     shown = scenes.world_points(bpy.data.objects["Bar2_live"])
     scenes.activate(bar)
     assert bpy.ops.arapfields.live() == {"FINISHED"}
     bpy.ops.ed.undo_push(message="off")
     assert "Bar2_live" not in bpy.data.objects and not bar.hide_render
     bpy.ops.ed.undo()
-    walk_scenes.settle()
+    world.settle()
     bar = bpy.data.objects["Bar2"]
     assert sessions.is_live(bar) and bar.hide_render
     assert np.array_equal(scenes.world_points(bpy.data.objects["Bar2_live"]), shown)
@@ -152,38 +152,38 @@ def test_a_live_object_behind_its_extracted_surface_stays_hidden_under_undo():
     bar.arapfields.resolution = 12
     take("live", bar)
     bpy.ops.ed.undo_push(message="live")
-    walk_scenes.settle()
+    world.settle()
     scenes.activate(bar)
     assert bpy.ops.arapfields.extract() == {"FINISHED"}
     bpy.ops.ed.undo_push(message="extract")
-    walk_scenes.settle()
+    world.settle()
     scenes.activate(bpy.data.objects["Bar2_implicit"], bar)
     assert bpy.ops.arapfields.carry() == {"FINISHED"}
     bpy.ops.ed.undo_push(message="carry")
-    walk_scenes.settle()
+    world.settle()
     assert bar.hide_get() and not bpy.data.objects["Bar2_implicit"].hide_get()
     bpy.ops.ed.undo()
-    walk_scenes.settle()
+    world.settle()
     assert bpy.data.objects["Bar2"].hide_get() and not bpy.data.objects["Bar2_implicit"].hide_get()
 
 
 @few_centers
 def test_a_shape_held_by_an_anchor_is_in_the_step_of_the_press():
-    walk_scenes.build_shapes()
+    world.build_shapes()
     ball = bpy.data.objects["Ball"]
     scenes.activate(ball)
     assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
-    walk_scenes.settle()
+    world.settle()
     ball.arapfields.stylize.use_handles = True
-    walk_scenes.settle()
+    world.settle()
     shown = scenes.world_points(ball)
     pin(ball, shown[0], 0.3, anchor=True)
     bpy.ops.ed.undo_push(message="anchor")
     assert ball.arapfields.held  # before any timer
-    walk_scenes.settle()
+    world.settle()
     bpy.ops.ed.undo_push(message="another step")
     bpy.ops.ed.undo()
-    walk_scenes.settle()
+    world.settle()
     assert np.array_equal(scenes.world_points(bpy.data.objects["Ball"]), shown)
 
 
@@ -208,15 +208,15 @@ def test_a_shape_comes_back_by_undo_after_its_helper_was_emptied():
     bar = bpy.data.objects["Bar0"]
     bar.modifiers["Mirror"].show_viewport = False
     take("live", bar)
-    walk_scenes.settle()
+    world.settle()
     bpy.ops.ed.undo_push(message="live")
-    walk_scenes.settle()
+    world.settle()
     shown = scenes.world_points(bar)
     bar.modifiers.remove(bar.modifiers["Mirror"])
     bpy.ops.ed.undo_push(message="removed")
-    walk_scenes.settle()
+    world.settle()
     bpy.ops.ed.undo()
-    walk_scenes.settle()
+    world.settle()
     bar = bpy.data.objects["Bar0"]
     assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
 
@@ -259,8 +259,8 @@ def test_an_import_with_its_rotation_comes_back_as_stored():
         push(message)
     bpy.ops.ed.undo()
     bpy.ops.ed.undo()
-    walk_scenes.settle()
-    assert walk_scenes.difference(scenes.world_points(bpy.data.objects["Bar"]), stored) < OFF
+    world.settle()
+    assert world.difference(scenes.world_points(bpy.data.objects["Bar"]), stored) < OFF
 
 
 @few_centers
@@ -273,13 +273,13 @@ def test_a_pin_moved_by_g_and_its_undo_take_the_mesh_along():
     for height in (0.6, 0.8, 1.0):
         bpy.data.objects[name].location.z = height
         push("G")  # before the timer has come round
-        walk_scenes.settle()
+        world.settle()
     for again, height in ((bpy.ops.ed.undo, 0.8), (bpy.ops.ed.undo, 0.6), (bpy.ops.ed.redo, 0.8)):
         again()
-        walk_scenes.settle()
+        world.settle()
         bar = bpy.data.objects["Bar"]
         assert abs(bpy.data.objects[name].location.z - height) < 1e-6
-        assert walk_scenes.difference(walk_scenes.shape(bar), walk_scenes.fresh_shape(bar, "DEFORM")) < OFF
+        assert world.difference(world.shape(bar), world.fresh_shape(bar, "DEFORM")) < OFF
 
 
 @few_centers
@@ -290,19 +290,17 @@ def test_each_live_style_is_that_of_the_settings_and_strength_0_is_rest():
     points = np.array([vertex.co for vertex in shell.data.vertices])
     points[:, 2] = 0.4 * np.cos(2 * points[:, 0])
     scenes.set_positions(shell.data, points)
-    rest = walk_scenes.shape(shell)
+    rest = world.shape(shell)
     bpy.ops.arapfields.live(kind="STYLIZE")
     bpy.ops.mesh.primitive_cube_add(size=1, location=(5, 0, 0), rotation=(0.5, 0.3, 0))
     style.style, style.style_object = "OBJECT", bpy.context.object
     for name in ("OBJECT", "ICOSAHEDRON", "CYLINDER"):
         style.style = name
         step(refined=True)
-        assert (
-            walk_scenes.difference(walk_scenes.shape(shell), walk_scenes.fresh_shape(shell, "STYLIZE")) < OFF
-        ), name
+        assert world.difference(world.shape(shell), world.fresh_shape(shell, "STYLIZE")) < OFF, name
     style.strength = 0.0
     step(refined=True)
-    assert sessions.is_live(shell) and np.abs(walk_scenes.shape(shell) - rest).max() < NO_MOTION
+    assert sessions.is_live(shell) and np.abs(world.shape(shell) - rest).max() < NO_MOTION
 
 
 @few_centers
@@ -327,20 +325,20 @@ def test_presses_and_cancelled_drags_of_a_live_style():
     entry = pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.4)).name
     entry = next(one for one in bar.arapfields.handles if one.empty.name == entry)
     bpy.ops.arapfields.live(kind="STYLIZE")
-    walk_scenes.settle()
+    world.settle()
     styled = scenes.world_points(bar)
     dragged = drag.of_entry(bpy.context, bar, entry)
     dragged.move(bpy.context, (0.9, 0.1, 0.6))
     dragged.cancel(bpy.context)
-    walk_scenes.settle()
+    world.settle()
     assert sessions.is_live(bar, "STYLIZE") and np.array_equal(scenes.world_points(bar), styled)
     drag.of_entry(bpy.context, bar, entry).end(bpy.context)
-    walk_scenes.settle()
+    world.settle()
     assert np.array_equal(scenes.world_points(bar), styled)
     for kind in ("STYLIZE", "DEFORM"):
         bpy.ops.arapfields.live(kind=kind)
-        walk_scenes.settle()
-        assert walk_scenes.difference(walk_scenes.shape(bar), walk_scenes.fresh_shape(bar, kind)) < 1e-5
+        world.settle()
+        assert world.difference(world.shape(bar), world.fresh_shape(bar, kind)) < 1e-5
 
 
 @few_centers
@@ -356,12 +354,12 @@ def test_a_style_that_waits_for_what_is_to_be_chosen_comes_back(lacks):
     else:
         style.style = "OBJECT"
     push("waits")
-    stored = walk_scenes.everything()
+    stored = world.everything()
     bpy.ops.arapfields.live(kind="STYLIZE")
     push("off")
     bpy.ops.ed.undo()
-    walk_scenes.settle()
-    assert sessions.is_live(bpy.data.objects["Bar"]) and walk_scenes.everything() == stored
+    world.settle()
+    assert sessions.is_live(bpy.data.objects["Bar"]) and world.everything() == stored
 
 
 @few_centers
@@ -372,7 +370,7 @@ def test_a_press_where_a_style_waits_for_its_object_holds_what_is_shown(comes_ba
     bar = scenes.bar()
     pin(bar, (1.0, 0.0, 0.25), target=(1.0, 0.0, 0.4))
     bpy.ops.arapfields.live(kind="STYLIZE")
-    walk_scenes.settle()
+    world.settle()
     shown = scenes.world_points(bar)
     bar.arapfields.stylize.style = "OBJECT"
     if comes_back:
@@ -380,11 +378,11 @@ def test_a_press_where_a_style_waits_for_its_object_holds_what_is_shown(comes_ba
         bpy.ops.arapfields.live(kind="STYLIZE")
         bpy.ops.ed.undo_push(message="ended")
         bpy.ops.ed.undo()
-        walk_scenes.settle()
+        world.settle()
         bar = bpy.data.objects["Bar"]
         assert np.array_equal(scenes.world_points(bar), shown)
     drag.of_entry(bpy.context, bar, bar.arapfields.handles[0]).end(bpy.context)
-    walk_scenes.settle()
+    world.settle()
     assert np.array_equal(scenes.world_points(bar), shown)
 
 
@@ -393,15 +391,15 @@ def test_a_step_comes_back_live_however_many_sessions_later():
     bar = scenes.bar()
     undo_begins()
     bpy.ops.arapfields.live(kind="STYLIZE")
-    walk_scenes.settle()
+    world.settle()
     push("live")
-    stored = walk_scenes.everything()
+    stored = world.everything()
     for _ in range(25):  # as undone and redone steps, and changed handles, begin them
         sessions.begin(bpy.context, bar, "STYLIZE")
     push("other")
     bpy.ops.ed.undo()
-    walk_scenes.settle()
-    assert sessions.is_live(bpy.data.objects["Bar"]) and walk_scenes.everything() == stored
+    world.settle()
+    assert sessions.is_live(bpy.data.objects["Bar"]) and world.everything() == stored
 
 
 @pytest.mark.parametrize("rests", [False, True])
@@ -426,5 +424,5 @@ def test_a_release_changes_nothing_that_is_seen(rests):
     shown = scenes.world_points(bar)
     dragged.end(bpy.context)
     bpy.context.view_layer.update()
-    assert walk_scenes.difference(scenes.world_points(bar), shown) < OFF
-    assert walk_scenes.difference(walk_scenes.shape(bar), walk_scenes.fresh_shape(bar, "DEFORM")) < 1e-5
+    assert world.difference(scenes.world_points(bar), shown) < OFF
+    assert world.difference(world.shape(bar), world.fresh_shape(bar, "DEFORM")) < 1e-5

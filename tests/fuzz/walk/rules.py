@@ -7,7 +7,7 @@ import numpy as np
 from addon.blender import references
 from addon.blender.object_references import settings_of
 from addon.live import sessions
-from tests.fuzz.walk import walk_scenes
+from tests.blender.walk import world
 
 from .steps import AllSteps, Steps
 
@@ -29,19 +29,19 @@ class Shapes:
 
     def __init__(self, _, tolerance=1e-5):
         self.tolerance, self.steps = tolerance, Steps()
-        walk_scenes.build_shapes()
+        world.build_shapes()
         self.begin()
 
     def begin(self):
         """What can be undone begins here."""
         bpy.ops.ed.undo_push(message="begin")
-        walk_scenes.settle()
+        world.settle()
         self.history, self.position = [self.note({})], 0
 
     def note(self, held):
         """What is shown now: of all, and of each source in local coordinates; and what holds a shape."""
-        shapes = {item.name: walk_scenes.shape(item) for item in walk_scenes.shape_sources()}
-        return walk_scenes.everything(), shapes, held
+        shapes = {item.name: world.shape(item) for item in world.shape_sources()}
+        return world.everything(), shapes, held
 
     def step(self, name, seed):
         """Takes a step, after which the rule holds; returns what was done, None if nothing can be."""
@@ -54,29 +54,29 @@ class Shapes:
             return None
         if name in ("undo", "redo"):
             self.position += 1 if name == "redo" else -1
-            walk_scenes.settle()
+            world.settle()
             if self.history[self.position] is None:
                 self.history[self.position] = self.note({})
             self.require_same(self.history[self.position][0])
         elif name == "save":
-            walk_scenes.settle()
+            world.settle()
             self.require_same(before[0])
             self.begin()
         else:
             bpy.ops.ed.undo_push(message=name)
-            walk_scenes.settle()
+            world.settle()
             held = self.check(name, said, self.steps.old, before)
             del self.history[self.position + 1 :]
             between = [None] * (references.pushed - pushed)  # where live mode has ended
             self.history = [*self.history, *between, self.note(held)][-40:]
             self.position = len(self.history) - 1
-        strays = walk_scenes.strays()
+        strays = world.strays()
         if strays:
             raise Broken(f"no Empties of their own: {strays}")
         return f"{self.steps.old}: {said}"
 
     def require_same(self, expected):
-        found = walk_scenes.everything()
+        found = world.everything()
         if found.keys() != expected.keys():
             raise Broken(f"{sorted(found)} are there, not {sorted(expected)}")
         for name, (place, seen) in expected.items():
@@ -85,18 +85,14 @@ class Shapes:
             if found[name][1] != seen:
                 shapes = self.history[self.position][1]
                 item = bpy.data.objects[name]
-                off = (
-                    walk_scenes.difference(walk_scenes.shape(item), shapes[name])
-                    if name in shapes
-                    else np.nan
-                )
+                off = world.difference(world.shape(item), shapes[name]) if name in shapes else np.nan
                 raise Broken(f"{name} is not what was stored: {off:.2g} of its size off")
 
     def check(self, name, said, old, before):
         """The shapes after a change; which of them are held as they are, for the next."""
         held = dict(before[2])
-        for item in walk_scenes.shape_sources():
-            now, kind = walk_scenes.shape(item), settings_of(item).live_kind
+        for item in world.shape_sources():
+            now, kind = world.shape(item), settings_of(item).live_kind
             mine = item == self.steps.source
             key = old if mine else item.name
             earlier = before[1].get(key)
@@ -115,11 +111,11 @@ class Shapes:
             if not mine and stays is None and np.array_equal(now, earlier):
                 continue  # as it was found right
             if kind and stays is None and not waits(item, kind):
-                off = walk_scenes.difference(now, walk_scenes.fresh_shape(item, kind))
+                off = world.difference(now, world.fresh_shape(item, kind))
                 if not off <= self.tolerance:
                     raise Broken(f"{item.name}, live {kind}, is {off:.2g} of its size off a fresh solve")
             elif stays is not None or (not kind and not (mine and name in GIVES_SHAPE)):
-                off = walk_scenes.difference(now, earlier)
+                off = world.difference(now, earlier)
                 if off != 0.0:
                     raise Broken(f"{item.name} ({kind or 'not live'}) moved by {off:.2g} of its size")
         return {one: kept for one, kept in held.items() if kept is not None}
@@ -145,47 +141,47 @@ KEEPS_POINTS |= {"frame", "keyframe", "rename", "hide", "parent", "place", "sele
 class All:
     def __init__(self, seed):
         self.steps = AllSteps()
-        walk_scenes.build(seed)
+        world.build(seed)
         self.begin()
 
     def begin(self):
         bpy.ops.ed.undo_push(message="begin")
-        walk_scenes.settle()
-        self.history, self.position = [walk_scenes.picture()], 0
+        world.settle()
+        self.history, self.position = [world.picture()], 0
 
     def step(self, name, seed):
         at_end = self.position + 1 == len(self.history)
         if (name == "undo" and self.position == 0) or (name == "redo" and at_end):
             return None
-        may_move = any(settings_of(item).result in ("REPLACE", "KEY") for item in walk_scenes.sources())
-        points, was_live, pushed = walk_scenes.rest(), dict(sessions.live), references.pushed
+        may_move = any(settings_of(item).result in ("REPLACE", "KEY") for item in world.sources())
+        points, was_live, pushed = world.rest(), dict(sessions.live), references.pushed
         said = self.steps.take(name, seed)
         if said is None and pushed == references.pushed:
             if self.history[self.position] is not None:
-                walk_scenes.settle()
-                require_same_pictures(self.history[self.position], walk_scenes.picture(), "what is refused")
+                world.settle()
+                require_same_pictures(self.history[self.position], world.picture(), "what is refused")
             return None
         if name in ("undo", "redo"):
             self.position += 1 if name == "redo" else -1
-            walk_scenes.settle()
+            world.settle()
             if self.history[self.position] is not None:
-                require_same_pictures(self.history[self.position], walk_scenes.picture(), said)
+                require_same_pictures(self.history[self.position], world.picture(), said)
         elif name == "save":
-            walk_scenes.settle()
+            world.settle()
             if not was_live and self.history[self.position] is not None:
-                require_same_pictures(self.history[self.position], walk_scenes.picture(), said)
+                require_same_pictures(self.history[self.position], world.picture(), said)
             self.begin()
         else:
             bpy.ops.ed.undo_push(message=name)
-            walk_scenes.settle()
+            world.settle()
             del self.history[self.position + 1 :]
             between = [None] * (references.pushed - pushed)  # where live mode has ended
-            self.history = [*self.history, *between, walk_scenes.picture()][-40:]
+            self.history = [*self.history, *between, world.picture()][-40:]
             self.position = len(self.history) - 1
             if name == "register":  # live mode ends with the extension, and does not come back by undo
                 self.history = [None if is_live(picture) else picture for picture in self.history]
             if name in KEEPS_POINTS and not may_move:
-                require_points(points, walk_scenes.rest(), said)
+                require_points(points, world.rest(), said)
         require_tidy()
         return f"{self.steps.old}: {said}"
 
@@ -215,6 +211,6 @@ def require_tidy():
     left = [scene.name for scene in bpy.data.scenes if scene.name.startswith("ARAP")]
     uids = {item.session_uid for item in bpy.data.objects}
     left += [f"a session of {uid}" for uid in sessions.live if uid not in uids]
-    left += [f"{name}: {path} leads nowhere" for name, path in walk_scenes.dangling()]
+    left += [f"{name}: {path} leads nowhere" for name, path in world.dangling()]
     if left:
         raise Broken(", ".join(left))

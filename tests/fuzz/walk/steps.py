@@ -13,7 +13,7 @@ from addon import registration
 from addon.blender.object_references import settings_of
 from addon.live import sessions
 from addon.pin_tool import drag, pins
-from tests.fuzz.walk import walk_scenes
+from tests.blender.walk import world
 
 # The steps of a walk of shapes, by the operators and calls that the window's gestures make. A step changes
 # the scene as a user does and returns what it did; None where it cannot be done now.
@@ -40,7 +40,7 @@ class Steps(Undoing):
         self.rng, self.source, self.old = None, None, ""
 
     def take(self, name, rng):
-        self.rng, items = rng, walk_scenes.shape_sources()
+        self.rng, items = rng, world.shape_sources()
         self.source = items[rng.integers(len(items))]
         self.old = self.source.name
         scenes.activate(self.source)
@@ -61,7 +61,7 @@ class Steps(Undoing):
         """The window's timer may have come round, with a shape or without."""
         if self.rng.random() < 0.6:
             bpy.context.view_layer.update()
-            sessions.update(bpy.context, wait=walk_scenes.WAIT if self.rng.random() < 0.5 else 0.0)
+            sessions.update(bpy.context, wait=world.WAIT if self.rng.random() < 0.5 else 0.0)
 
     def moves(self, dragged):
         start = np.array(dragged.empty.get().matrix_world.translation)
@@ -177,7 +177,7 @@ class Steps(Undoing):
         return "pin deleted"
 
     def delete(self):
-        if len(walk_scenes.shape_sources()) < 3:
+        if len(world.shape_sources()) < 3:
             return None
         bpy.ops.object.delete()
         return "object deleted"
@@ -197,7 +197,7 @@ class Steps(Undoing):
         return name
 
     def wrap(self):
-        others = [item for item in walk_scenes.shape_sources() if item != self.source]
+        others = [item for item in world.shape_sources() if item != self.source]
         self.settings.wrap.onto = others[self.rng.integers(len(others))]
         bpy.ops.arapfields.wrap(samples=400, iterations=3, centers=20, stages=1)
         return "wrap"
@@ -260,13 +260,13 @@ class AllSteps(Undoing):
 
     def take(self, name, seed):
         self.rng = np.random.default_rng(seed)
-        items = walk_scenes.sources()
+        items = world.sources()
         if not items:
             return self.add() if name == "add" else None
         self.source = items[self.rng.integers(len(items))]
         self.old = self.source.name
         if self.source.library is None:
-            walk_scenes.small(self.source)  # it may be a result, which has settings of its own
+            world.small(self.source)  # it may be a result, which has settings of its own
         scenes.activate(self.source)
         return getattr(self, name)()
 
@@ -409,7 +409,7 @@ class AllSteps(Undoing):
         if self.chance(0.3):
             return self.call(bpy.ops.arapfields.remove_handle)
         if self.chance(0.5) and bpy.ops.arapfields.add_handle.poll():
-            walk_scenes.give_handles(self.source)
+            world.give_handles(self.source)
             return "two handles"
         kind = self.one_of(("CUBE", "SPHERE", "POINT", "PIN", "GROUP"))
         return self.call(bpy.ops.arapfields.add_handle, kind=str(kind), place="CURSOR")
@@ -486,7 +486,7 @@ class AllSteps(Undoing):
 
     def delete(self):
         item = self.one_of(bpy.context.view_layer.objects)
-        if len(walk_scenes.sources()) < 3 or item.hide_get() or item.hide_viewport:
+        if len(world.sources()) < 3 or item.hide_get() or item.hide_viewport:
             return None
         name = item.name
         scenes.activate(item)
@@ -494,7 +494,7 @@ class AllSteps(Undoing):
 
     def join(self):
         other = self.other()
-        if other is None or other.type != "MESH" or len(walk_scenes.sources()) < 4:
+        if other is None or other.type != "MESH" or len(world.sources()) < 4:
             return None
         scenes.activate(other, self.source)
         return self.call(bpy.ops.object.join)
@@ -621,7 +621,7 @@ class AllSteps(Undoing):
     def add(self):
         if len(bpy.context.view_layer.objects) > 30:
             return None
-        bar = walk_scenes.bar(self.rng, "New", (5.0, float(self.rng.normal()), 0.0))
+        bar = world.bar(self.rng, "New", (5.0, float(self.rng.normal()), 0.0))
         return f"{bar.name} added"
 
     def link(self):

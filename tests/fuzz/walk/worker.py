@@ -49,12 +49,12 @@ def main():
 
     output = Output()
     import addon
-    from tests.fuzz.walk import walk_scenes
+    from tests.blender.walk import world
     from tests.fuzz.walk.rules import All, Shapes
     from tests.fuzz.walk.run import Walk
 
     addon.register()
-    walk_scenes.few_centers()
+    world.few_centers()
     for line in sys.stdin:
         walk = Walk.of(line)
         try:

@@ -171,7 +171,7 @@ def dangling():
     kinds = ("objects", "meshes", "curves", "lattices", "armatures", "node_groups", "materials", "actions")
     there = {one.as_pointer() for kind in kinds for one in getattr(bpy.data, kind)}
     found = []
-    for item in bpy.data.objects:
+    for item in list(bpy.data.objects):
         named = [("data", item.data), ("parent", item.parent)]
         for modifier in item.modifiers:
             named += [(f"{modifier.name}: {path}", value) for path, value in references.references(modifier)]
