@@ -25,7 +25,7 @@ struct DistortionLimits {
 /// What a field does to a mesh's own triangles. Of meshes with more than `most_measured` triangles, those
 /// with the longest edges are looked at, which are the first to go wrong.
 struct MeshMeasures {
-  static constexpr Index most_measured = 20'000, most_wrong = 2000;
+  static constexpr Index most_measured = 200'000, most_wrong = 2000;
   Distortion distortion;  ///< at the triangles' middles, and near the corners of those that change much
   Index measured = 0;     ///< triangles
   Index folded = 0;       ///< of them, those with det J ≤ 0 at a place that was looked at
