@@ -51,9 +51,8 @@ class Snapshot:
         live_modifier.put_mark(source, self.mark)
         if sessions.is_live(source):  # else it has ended with an error, shown in the panel
             sessions.live[source.session_uid].restored(is_held)
-            sessions.update(context)
-            if is_held and sessions.is_live(source) and sessions.live[source.session_uid].is_held:
-                sessions.update(context)  # the solver has been set up anew
+            for _ in range(2):  # the first update may set the solver up anew
+                sessions.update(context)
 
 
 class Drag:

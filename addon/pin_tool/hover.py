@@ -80,6 +80,11 @@ class View:
         return screen.project(self.perspective, self.size, location)[0]
 
     @property
+    def is_inside(self):
+        """Whether the cursor is over the view."""
+        return all(0 <= at < size for at, size in zip(self.pixel, self.size, strict=True))
+
+    @property
     def towards(self):
         """The axis that points at the viewer."""
         return self.view.view_rotation @ type(self.view.view_location)((0, 0, 1))

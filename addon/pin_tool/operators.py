@@ -34,6 +34,13 @@ def reach_steps(event):
     return 0
 
 
+def look(context, view, other=False):
+    """Finds what lies under the cursor and what a press would do there."""
+    hover.target, hover.missed = under(context, view, lights=True, other=other), None
+    hover.pixel, hover.region = view.pixel, context.region.as_pointer()
+    hover.label = "" if hover.target is None else drawing.label(hover.target)
+
+
 class PinOperator(ReportingOperator):
     """Mixin: works in a 3D view in Object Mode."""
 
@@ -85,10 +92,10 @@ class Dragging(PinOperator):
     def follow(self, context, event):
         if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
             self.drag.cancel(context)
-            return self.leave(context, {"CANCELLED"})
+            return self.leave(context, {"CANCELLED"}, event)
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             if not self.drag.has_moved:
-                return self.end(context, {"FINISHED"})
+                return self.end(context, {"FINISHED"}, event)
             self.timer = host.start_events(context, TICK)
             sessions.update(context)
             return {"RUNNING_MODAL"}
@@ -123,21 +130,25 @@ class Dragging(PinOperator):
         """After the release: runs until the shape has settled, or until the next user event."""
         if event.type == "TIMER":
             sessions.update(context)
-            return self.end(context, {"FINISHED"}) if self.drag.is_settled() else {"RUNNING_MODAL"}
+            return self.end(context, {"FINISHED"}, event) if self.drag.is_settled() else {"RUNNING_MODAL"}
         if event.type in ("MOUSEMOVE", "INBETWEEN_MOUSEMOVE") or event.value == "RELEASE":
             return {"PASS_THROUGH"}
-        return self.end(context, {"FINISHED", "PASS_THROUGH"})
+        return self.end(context, {"FINISHED", "PASS_THROUGH"}, event)
 
-    def end(self, context, result):
+    def end(self, context, result, event):
         self.drag.end(context)
-        return self.leave(context, result)
+        return self.leave(context, result, event)
 
-    def leave(self, context, result):
+    def leave(self, context, result, event=None):
+        """Ends the drag; by an `event`, what lies under the cursor then is shown at once."""
         if self.timer is not None:
             host.stop_events(self.timer)
             self.timer = None
         if hover.drag is self.drag:
             hover.clear()
+            view = None if event is None or context.region_data is None else View(context, event)
+            if view is not None and view.is_inside:
+                look(context, view, other=event.alt)
         drawing.refresh()
         redraw(context, "WINDOW", "UI")
         return result
@@ -193,9 +204,7 @@ class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
         if context.region_data is not None and hover.drag is None:
             view = View(context, event)
             before = hover.target or hover.missed
-            hover.target, hover.missed = under(context, view, lights=True, other=event.alt), None
-            hover.pixel, hover.region = view.pixel, context.region.as_pointer()
-            hover.label = "" if hover.target is None else drawing.label(hover.target)
+            look(context, view, other=event.alt)
             drawing.refresh()
             if before is not None or hover.target is not None:
                 context.region.tag_redraw()
