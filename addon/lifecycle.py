@@ -71,8 +71,9 @@ def after_restore(*_):
     """A step was undone or redone."""
     hover.clear()
     solve_job.steps.recover()
-    applied_transforms.after_undo()
+    changed = applied_transforms.after_undo()
     recovery.after_undo()
+    recovery.hold(changed)
 
 
 @persistent
@@ -80,7 +81,7 @@ def after_update(scene, depsgraph):
     if not modifier_stack.is_stage(scene):
         source_surface.watch(depsgraph)
         if not sessions.live.is_rendering:
-            applied_transforms.follow(depsgraph)
+            recovery.hold(applied_transforms.follow(depsgraph))
         sessions.watch(depsgraph)
         motion.written.clear()
         if not sessions.live.is_rendering:

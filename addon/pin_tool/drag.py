@@ -51,12 +51,13 @@ class Snapshot:
         live_modifier.put_mark(source, self.mark)
         if sessions.is_live(source):  # else it has ended with an error, shown in the panel
             sessions.live[source.session_uid].restored(is_held)
-            for _ in range(2):  # the first update may set the solver up anew
-                sessions.update(context)
+            sessions.update(context)
 
 
 class Drag:
     """A drag of a handle's Empty. `is_new`: the pin was placed by the same press."""
+
+    is_released = False  # whether the button is up, and the shape settles
 
     def __init__(self, context, before, empty, is_new=False):
         self.before, self.is_new, self.has_moved = before, is_new, False

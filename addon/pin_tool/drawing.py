@@ -83,7 +83,7 @@ status = Status()
 
 def refresh():
     """Shows the keys for what is under the cursor or dragged."""
-    status.show(keys(hover.target, hover.drag))
+    status.show(keys(hover.target, hover.held))
 
 
 def watch():
@@ -174,7 +174,7 @@ def draw():
         return
     brush = Brush(context)
     gpu.state.blend_set("ALPHA")
-    target = hover.target if hover.drag is None else None
+    target = hover.target if hover.held is None else None
     if target is not None and target.kind == "SURFACE":
         draw_surface(brush, target)
     gpu.state.depth_test_set("NONE")
@@ -191,7 +191,7 @@ def draw():
 def draw_label():
     """What a press does, or that it has missed, beside the cursor."""
     context, spot = bpy.context, hover.missed or hover.pixel
-    if context.region_data is None or spot is None or hover.drag is not None or not is_active(context):
+    if context.region_data is None or spot is None or hover.held is not None or not is_active(context):
         return
     text = translated("Nothing to pin here") if hover.missed else hover.label
     if not text or hover.region != context.region.as_pointer():

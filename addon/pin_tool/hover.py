@@ -50,6 +50,11 @@ class Hover:
         self.target = self.drag = self.pixel = self.missed = self.region = None
         self.label = ""  # what a press does there
 
+    @property
+    def held(self):
+        """The running drag while its button is pressed; None while its shape settles."""
+        return None if self.drag is None or self.drag.is_released else self.drag
+
 
 hover = Hover()
 

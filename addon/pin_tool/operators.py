@@ -96,8 +96,9 @@ class Dragging(PinOperator):
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             if not self.drag.has_moved:
                 return self.end(context, {"FINISHED"}, event)
-            self.timer = host.start_events(context, TICK)
+            self.timer, self.drag.is_released = host.start_events(context, TICK), True
             sessions.update(context)
+            self.show(context, event)
             return {"RUNNING_MODAL"}
         steps = reach_steps(event)
         if steps:
@@ -146,12 +147,16 @@ class Dragging(PinOperator):
             self.timer = None
         if hover.drag is self.drag:
             hover.clear()
-            view = None if event is None or context.region_data is None else View(context, event)
-            if view is not None and view.is_inside:
-                look(context, view, other=event.alt)
+        self.show(context, event)
+        return result
+
+    def show(self, context, event):
+        """Shows what lies under the cursor, if the event is one over the view."""
+        view = None if event is None or context.region_data is None else View(context, event)
+        if view is not None and view.is_inside:
+            look(context, view, other=event.alt)
         drawing.refresh()
         redraw(context, "WINDOW", "UI")
-        return result
 
     def cancel(self, context):
         self.leave(context, None)
@@ -201,7 +206,7 @@ class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
     bl_options = {"INTERNAL"}
 
     def invoke(self, context, event):
-        if context.region_data is not None and hover.drag is None:
+        if context.region_data is not None and hover.held is None:
             view = View(context, event)
             before = hover.target or hover.missed
             look(context, view, other=event.alt)

@@ -373,14 +373,17 @@ class InView:
         return getattr(bpy.context, name)
 
 
-@pytest.mark.parametrize("ends", ["released", "cancelled"])
+@pytest.mark.parametrize("ends", ["released", "cancelled", "settling"])
 def test_the_status_bar_has_the_keys_as_soon_as_a_drag_ends(ends):
     """It was empty until the mouse moved."""
     bar = scenes.bar()
     view = from_above(0.9)
     view.pixel = (380, 200)  # where that place is
-    kept, operators.View = operators.View, lambda context, event: view
+    kept = operators.View, operators.host.start_events, operators.host.stop_events
+    operators.View = lambda context, event: view
+    operators.host.start_events = operators.host.stop_events = lambda *_: 1
     dragged = drag.of_new_pin(bpy.context, bar, np.array([0.9, 0.0, 0.25]), 0.1)
+    dragged.has_moved = ends == "settling"
     running = type("Dragged", (operators.Dragging,), {})()
     running.drag, running.kind, running.timer, running.last = dragged, "MOVE", None, view.pixel
     hover.hover.drag = dragged
@@ -390,15 +393,16 @@ def test_the_status_bar_has_the_keys_as_soon_as_a_drag_ends(ends):
         end.type, end.value = "ESC", "PRESS"
     view.is_inside = hover.View.is_inside.fget(view)
     try:
-        assert running.modal(context, end) == {"FINISHED" if ends == "released" else "CANCELLED"}
-        assert hover.hover.target.kind == ("HANDLE" if ends == "released" else "SURFACE")
+        results = {"released": "FINISHED", "cancelled": "CANCELLED", "settling": "RUNNING_MODAL"}
+        assert running.modal(context, end) == {results[ends]}
+        assert hover.hover.target.kind == ("SURFACE" if ends == "cancelled" else "HANDLE")
         assert drawing.status.text == drawing.keys(hover.hover.target, None) != ""
         hover.hover.drag, view.pixel = dragged, (410, 200)  # over another region
         view.is_inside = hover.View.is_inside.fget(view)
         running.leave(context, None, end)
         assert hover.hover.target is None and drawing.status.text == ""
     finally:
-        operators.View = kept
+        operators.View, operators.host.start_events, operators.host.stop_events = kept
         hover.hover.clear()
         drawing.refresh()
 
