@@ -148,7 +148,7 @@ STATE = (job_operator.runs, jobs.board, display, sessions.live, held_counts.pend
 STATE += (motion.written, carrying.written, hover, prefetch, applying.solved, overlays.shown)
 STATE += (solve_job.steps, empties.seen_active, host, style_settings.style_cache, left_behind.seen)
 STATE += (live_modifier.shapes, applied_transforms.seen, applied_transforms.followed, status, symmetry.planes)
-STATE += (first_run.welcome, landmarks.nearest)
+STATE += (first_run.welcome, landmarks.nearest, landmark_tools.half)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread
 
