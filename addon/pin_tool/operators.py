@@ -54,6 +54,14 @@ class PinOperator(ReportingOperator):
     def change(self, context, source):
         raise UserError("A 3D view is needed")
 
+    def show(self, context, event):
+        """Shows what lies under the cursor, if the event is one over the view."""
+        view = None if event is None or context.region_data is None else View(context, event)
+        if view is not None and view.is_inside:
+            look(context, view, other=event.alt)
+        drawing.refresh()
+        redraw(context, "WINDOW", "UI")
+
 
 class Dragging(PinOperator):
     """Mixin of modal operators that drag a handle until the button is released."""
@@ -149,14 +157,6 @@ class Dragging(PinOperator):
             hover.clear()
         self.show(context, event)
         return result
-
-    def show(self, context, event):
-        """Shows what lies under the cursor, if the event is one over the view."""
-        view = None if event is None or context.region_data is None else View(context, event)
-        if view is not None and view.is_inside:
-            look(context, view, other=event.alt)
-        drawing.refresh()
-        redraw(context, "WINDOW", "UI")
 
     def cancel(self, context):
         self.leave(context, None)
@@ -278,7 +278,7 @@ class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
                 drag.of_entry(context, source, entry).end(context)
         except (UserError, ValueError) as error:
             return self.refuse(error)
-        redraw(context, "WINDOW", "UI")
+        self.show(context, event)
         return {"FINISHED"}
 
 
@@ -318,20 +318,20 @@ class ARAPFIELDS_OT_pin_delete(PinOperator, bpy.types.Operator):
 
     def invoke(self, context, event):
         if not self.under:
-            return self.execute(context)
+            return self.delete(context, pins.chosen(context), event)
         target = under(context, view_at_press(context, event))
         empty = target.empty.find() if target is not None and target.kind == "HANDLE" else None
-        return self.delete(context, empty)
+        return self.delete(context, empty, event)
 
     def execute(self, context):
         return self.delete(context, pins.chosen(context))
 
-    def delete(self, context, empty):
+    def delete(self, context, empty, event=None):
         if empty is None:
             return {"PASS_THROUGH"}
         pins.remove(context, owner_of(empty), empty)
         hover.clear()
-        redraw(context, "WINDOW", "UI")
+        self.show(context, event)
         return {"FINISHED"}
 
 

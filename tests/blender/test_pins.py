@@ -367,7 +367,7 @@ def test_the_label_says_what_a_press_does():
 class InView:
     """Blender's context as it is in a 3D view."""
 
-    region, region_data = SimpleNamespace(as_pointer=lambda: 1), object()
+    region, region_data = SimpleNamespace(as_pointer=lambda: 1, x=0, y=0), object()
 
     def __getattr__(self, name):
         return getattr(bpy.context, name)
@@ -403,6 +403,29 @@ def test_the_status_bar_has_the_keys_as_soon_as_a_drag_ends(ends):
         assert hover.hover.target is None and drawing.status.text == ""
     finally:
         operators.View, operators.host.start_events, operators.host.stop_events = kept
+        hover.hover.clear()
+        drawing.refresh()
+
+
+def test_what_a_press_does_is_said_anew_after_an_anchor_is_placed_and_deleted():
+    """The label told of the surface that was there before, until the mouse moved."""
+    scenes.bar()
+    view = from_above(0.9)
+    view.pixel, view.is_inside = (380, 200), True
+    event = SimpleNamespace(type="LEFTMOUSE", alt=False, mouse_prev_x=-1, mouse_prev_y=-1)
+    kept, operators.View = operators.View, lambda context, event: view
+    try:
+        for cls, under, label in (
+            (operators.ARAPFIELDS_OT_pin_anchor, False, "Choose Pin 1, an anchor"),
+            (operators.ARAPFIELDS_OT_pin_delete, True, "Pin Bar"),
+        ):
+            methods = {name: vars(cls)[name] for name in ("invoke", "delete") if name in vars(cls)}
+            pressed = type("Pressed", (operators.PinOperator,), methods | {"under": under})()
+            assert pressed.invoke(InView(), event) == {"FINISHED"}
+            assert hover.hover.label == label
+            assert drawing.status.text == drawing.keys(hover.hover.target, None)
+    finally:
+        operators.View = kept
         hover.hover.clear()
         drawing.refresh()
 
