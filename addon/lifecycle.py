@@ -71,8 +71,9 @@ def after_restore(*_):
     """A step was undone or redone."""
     hover.clear()
     solve_job.steps.recover()
-    applied_transforms.after_undo()
+    changed = applied_transforms.after_undo()
     recovery.after_undo()
+    recovery.hold(changed)
 
 
 @persistent
@@ -80,7 +81,7 @@ def after_update(scene, depsgraph):
     if not modifier_stack.is_stage(scene):
         source_surface.watch(depsgraph)
         if not sessions.live.is_rendering:
-            applied_transforms.follow(depsgraph)
+            recovery.hold(applied_transforms.follow(depsgraph))
         sessions.watch(depsgraph)
         motion.written.clear()
         if not sessions.live.is_rendering:
@@ -147,7 +148,7 @@ STATE = (job_operator.runs, jobs.board, display, sessions.live, held_counts.pend
 STATE += (motion.written, carrying.written, hover, prefetch, applying.solved, overlays.shown)
 STATE += (solve_job.steps, empties.seen_active, host, style_settings.style_cache, left_behind.seen)
 STATE += (live_modifier.shapes, applied_transforms.seen, applied_transforms.followed, status, symmetry.planes)
-STATE += (first_run.welcome, landmarks.nearest)
+STATE += (first_run.welcome, landmarks.nearest, landmark_tools.half)
 
 LONGEST = 10.0  # seconds that the end of the process waits for a thread
 

@@ -215,7 +215,7 @@ class BakeOperator(JobOperator):
                 self.failures.append(about(source.name, error))
         if not bakes:
             return []
-        self.frames_pass = BakePass(bakes, chosen)
+        self.frames_pass, self.worked_on = BakePass(bakes, chosen), [bake.reference for bake in bakes]
         return [self.frames_pass.item(context, job, self.failures)]
 
 

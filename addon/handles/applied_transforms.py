@@ -64,12 +64,9 @@ def is_watched(item):
 
 
 def follow(depsgraph):
-    """Checks the objects that a depsgraph has updated."""
-    for update in depsgraph.updates:
-        if update.is_updated_transform or update.is_updated_geometry:
-            source = update.id.original
-            if is_watched(source):
-                check(source)
+    """Checks the objects that a depsgraph has updated; returns those that were changed."""
+    updates = [one for one in depsgraph.updates if one.is_updated_transform or one.is_updated_geometry]
+    return [one.id.original for one in updates if is_watched(one.id.original) and check(one.id.original)]
 
 
 def check(source):
@@ -79,16 +76,21 @@ def check(source):
         followed[state_of(source, now)] = change
         apply(source, change)
     seen[source.session_uid] = now
+    return change is not None
 
 
 def after_undo():
-    """Repeats the changes that steps of undo do not have; what undo has moved is no change."""
+    """Repeats the changes that steps of undo do not have; what undo has moved is no change. Returns the
+    objects that were changed."""
+    changed = []
     for source in filter(is_watched, list(bpy.data.objects)):
         now = placement_of(source)
         change = followed.get(state_of(source, now)) if followed else None
         if change is not None:
             apply(source, change)
+            changed.append(source)
         seen[source.session_uid] = now
+    return changed
 
 
 def state_of(source, placement):

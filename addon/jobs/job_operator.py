@@ -140,6 +140,7 @@ class JobOperator(ModalRun, Guided):
     """
 
     title = ""
+    worked_on = ()  # ObjectReferences; once all of these objects are deleted, the job ends
 
     scope: choice(SCOPES, "Objects", "Which objects to work on", options={"SKIP_SAVE"})
 
@@ -176,8 +177,8 @@ class JobOperator(ModalRun, Guided):
 
     def prepare(self, context, job):
         """Coroutine that reads all sources, and their items; errors in planning go to `failures`."""
-        items = []
-        for reference in [ObjectReference(source) for source in self.sources(context)]:
+        items, self.worked_on = [], [ObjectReference(source) for source in self.sources(context)]
+        for reference in self.worked_on:
             try:
                 source = reference.get()
                 groups, in_place = self.groups_of(source), self.in_place(source)
@@ -198,6 +199,8 @@ class JobOperator(ModalRun, Guided):
             job.start((yield from self.prepare(context, job)))
             yield from self.work_beside(context, job)
             while not job.done:
+                if self.losses():
+                    job.cancel()
                 yield Pause.WORKER
             result = yield from self.conclude(context, job)
         except JobCancelled:
@@ -208,6 +211,17 @@ class JobOperator(ModalRun, Guided):
         if result == {"CANCELLED"}:
             self.push_undo()
         return result
+
+    def losses(self):
+        """A UserError for each object that is worked on, if all of them are deleted; else []."""
+        found = []
+        for reference in self.worked_on:
+            try:
+                reference.get()
+                return []
+            except UserError as error:
+                found.append(error)
+        return found
 
     def work_beside(self, context, job):
         """Coroutine of main-thread work while the worker runs."""
@@ -240,6 +254,8 @@ class JobOperator(ModalRun, Guided):
                 self.failures.append(about(outcome.item.label, outcome.error))
             else:
                 cancelled |= yield from self.apply_one(job, outcome)
+        if cancelled:
+            self.failures += map(translated, self.losses())
         if cancelled and not self.successes and not self.failures:
             self.add_message("INFO", translated("{job} cancelled", job=translated(self.title)))
             return {"CANCELLED"}

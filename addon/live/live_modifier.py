@@ -60,6 +60,11 @@ def mark(source):
     return "" if modifier is None else motion.carrier(source, modifier).get(SHAPE_OF, "")
 
 
+def is_at_rest(source):
+    """Whether the source's modifier shows a live shape that was solved from rest."""
+    return mark(source) not in ("", UNSETTLED)
+
+
 def put_mark(source, key):
     modifier, nodes = modifier_stack.find(source), field_nodes.of(source)
     meshes = [motion.carrier(source, modifier)] if modifier is not None else []

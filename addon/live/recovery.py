@@ -37,6 +37,20 @@ def after_undo():
         host.start(poll_live, persistent=True)
 
 
+def hold(sources):
+    """Keeps the shapes at rest of sources whose coordinates have changed, the same in the world, until a
+    handle moves. A style has directions in these coordinates, and is solved anew."""
+    for source in sources:
+        session, uid = live.get(source.session_uid), source.session_uid
+        is_moving = session is not None and session.has_motion
+        if settings_of(source).live_kind != "DEFORM" or is_moving or not live_modifier.is_at_rest(source):
+            continue
+        if session is not None:
+            session.restored(is_held=True)
+        elif uid in live.returning:
+            live.held.add(uid)
+
+
 def after_load():
     """Load handler: objects that were live when the file was saved become results."""
     recover(adopt)

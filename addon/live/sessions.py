@@ -67,6 +67,7 @@ class Sessions(dict):
         self.past = Kept(lambda former: former.display.arrays)
         self.shown_scene = ShownScene()
         self.returning = {}  # {session_uid of a source: Former}, to be restarted after undo
+        self.held = set()  # session_uids in `returning` whose shape then stays until a handle moves
         # session_uids of sources that are live in the step that was undone to, but cannot be now: the step is
         # left as it is, since what is wrong there is mended by a further undo.
         self.paused = set()
@@ -84,6 +85,7 @@ class Sessions(dict):
         self.is_rendering = False
         self.past.clear()
         self.returning.clear()
+        self.held.clear()
         self.paused.clear()
         for uid in list(self):
             session = self.pop(uid)
@@ -131,7 +133,8 @@ def begin(context, source, kind="DEFORM", keeps_shape=False, way=None):
     finally:
         live.begun = None
     session.is_back = returned is not None
-    session.is_held = earlier is not None and earlier.is_held
+    session.is_held = (earlier is not None and earlier.is_held) or source.session_uid in live.held
+    live.held.discard(source.session_uid)
     if session.display.in_place:
         layers.note(source, kind)
     live[source.session_uid] = session
@@ -214,6 +217,7 @@ def stop_all():
     live.is_rendering = False
     live.past.clear()
     live.returning.clear()
+    live.held.clear()
     live.paused.clear()
     while live:
         live.popitem()[1].stop()
@@ -229,19 +233,24 @@ def update(context, wait=0.0, refined=False):
 
 def update_one(context, uid, wait=0.0, refined=False):
     """The same for one session, without a step of undo; returns whether its end has changed the scene."""
-    session = live[uid]
-    try:
-        session.update(context)
-        if wait:
-            session.wait(wait, refined)
-        session.show()
-        warn(session)
-    except SourceChanged:
-        with references.between():
-            return not restart(context, uid, session)
-    except (UserError, ValueError, ReferenceError) as error:
-        return end_with_error(uid, session, error)
-    session.is_back = False
+    for _ in range(2):  # a session that is set up anew with a held shape has it at once
+        session = live[uid]
+        try:
+            session.update(context)
+            if wait:
+                session.wait(wait, refined)
+            session.show()
+            warn(session)
+            session.is_back = False
+            return False
+        except SourceChanged:
+            with references.between():
+                if not restart(context, uid, session):
+                    return True
+        except (UserError, ValueError, ReferenceError) as error:
+            return end_with_error(uid, session, error)
+        if not live[uid].is_held:
+            break
     return False
 
 

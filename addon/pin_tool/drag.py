@@ -52,12 +52,12 @@ class Snapshot:
         if sessions.is_live(source):  # else it has ended with an error, shown in the panel
             sessions.live[source.session_uid].restored(is_held)
             sessions.update(context)
-            if is_held and sessions.is_live(source) and sessions.live[source.session_uid].is_held:
-                sessions.update(context)  # the solver has been set up anew
 
 
 class Drag:
     """A drag of a handle's Empty. `is_new`: the pin was placed by the same press."""
+
+    is_released = False  # whether the button is up, and the shape settles
 
     def __init__(self, context, before, empty, is_new=False):
         self.before, self.is_new, self.has_moved = before, is_new, False

@@ -83,7 +83,7 @@ status = Status()
 
 def refresh():
     """Shows the keys for what is under the cursor or dragged."""
-    status.show(keys(hover.target, hover.drag))
+    status.show(keys(hover.target, hover.held))
 
 
 def watch():
@@ -118,7 +118,8 @@ ANCHOR_STROKES = (  # of a square from -1 to 1
     0.17 * np.concatenate([CIRCLE, CIRCLE[:1]]) + (0, 0.6),
 )
 ENOUGH = 8  # least number of highlighted triangles; with fewer, a disc is drawn
-SIZE, OFFSET = 12, 16  # of the label and its distance from the cursor, in pixels
+SIZE, OFFSET, MARGIN = 12, 16, 5  # of the label, its distance from the cursor, and around its text, in pixels
+BEHIND = (0.1, 0.1, 0.1, 0.75)  # the colour behind the label, which may lie on a bright surface
 GHOST = 0.35  # opacity of mirrored discs
 LIFT = 1.5  # offset of the highlight towards the viewer, in pixels
 
@@ -127,6 +128,12 @@ def is_active(context):
     """Whether the pin tool is the one in use in this window's Object Mode."""
     tool = context.workspace.tools.from_space_view3d_mode("OBJECT", create=False)
     return tool is not None and tool.idname == TOOL and context.mode == "OBJECT"
+
+
+def is_transforming(context):
+    """Whether Blender's own Move, Rotate or Scale runs, to which a press belongs then."""
+    running = getattr(context.window, "modal_operators", ())
+    return any(operator.bl_idname.startswith("TRANSFORM_OT_") for operator in running)
 
 
 class Brush:
@@ -174,7 +181,7 @@ def draw():
         return
     brush = Brush(context)
     gpu.state.blend_set("ALPHA")
-    target = hover.target if hover.drag is None else None
+    target = hover.target if hover.held is None and not is_transforming(context) else None
     if target is not None and target.kind == "SURFACE":
         draw_surface(brush, target)
     gpu.state.depth_test_set("NONE")
@@ -191,19 +198,26 @@ def draw():
 def draw_label():
     """What a press does, or that it has missed, beside the cursor."""
     context, spot = bpy.context, hover.missed or hover.pixel
-    if context.region_data is None or spot is None or hover.drag is not None or not is_active(context):
+    if context.region_data is None or spot is None or hover.held is not None or not is_active(context):
+        return
+    if is_transforming(context):
         return
     text = translated("Nothing to pin here") if hover.missed else hover.label
     if not text or hover.region != context.region.as_pointer():
         return
     scale = context.preferences.system.ui_scale
     blf.size(0, SIZE * scale)
-    blf.enable(0, blf.SHADOW)
-    blf.shadow(0, 5, 0.0, 0.0, 0.0, 0.9)
+    (width, height), left, low = blf.dimensions(0, text), *(np.array(spot) + OFFSET * scale)
+    margin, shader = MARGIN * scale, gpu.shader.from_builtin("UNIFORM_COLOR")
+    x, y = (left - margin, left + width + margin), (low - margin, low + height + margin)
+    corners = [(x[i], y[j], 0.0) for i, j in ((0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1))]
+    gpu.state.blend_set("ALPHA")
+    shader.uniform_float("color", BEHIND)
+    batch_for_shader(shader, "TRIS", {"pos": corners}).draw(shader)
+    gpu.state.blend_set("NONE")
     blf.color(0, 1.0, 1.0, 1.0, 1.0)
-    blf.position(0, spot[0] + OFFSET * scale, spot[1] + OFFSET * scale, 0)
+    blf.position(0, left, low, 0)
     blf.draw(0, text)
-    blf.disable(0, blf.SHADOW)
 
 
 def ghosts(handles):

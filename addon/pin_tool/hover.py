@@ -50,6 +50,11 @@ class Hover:
         self.target = self.drag = self.pixel = self.missed = self.region = None
         self.label = ""  # what a press does there
 
+    @property
+    def held(self):
+        """The running drag while its button is pressed; None while its shape settles."""
+        return None if self.drag is None or self.drag.is_released else self.drag
+
 
 hover = Hover()
 
@@ -78,6 +83,11 @@ class View:
 
     def pixel_of(self, location):
         return screen.project(self.perspective, self.size, location)[0]
+
+    @property
+    def is_inside(self):
+        """Whether the cursor is over the view."""
+        return all(0 <= at < size for at, size in zip(self.pixel, self.size, strict=True))
 
     @property
     def towards(self):

@@ -34,6 +34,13 @@ def reach_steps(event):
     return 0
 
 
+def look(context, view, other=False):
+    """Finds what lies under the cursor and what a press would do there."""
+    hover.target, hover.missed = under(context, view, lights=True, other=other), None
+    hover.pixel, hover.region = view.pixel, context.region.as_pointer()
+    hover.label = "" if hover.target is None else drawing.label(hover.target)
+
+
 class PinOperator(ReportingOperator):
     """Mixin: works in a 3D view in Object Mode."""
 
@@ -46,6 +53,14 @@ class PinOperator(ReportingOperator):
 
     def change(self, context, source):
         raise UserError("A 3D view is needed")
+
+    def show(self, context, event):
+        """Shows what lies under the cursor, if the event is one over the view."""
+        view = None if event is None or context.region_data is None else View(context, event)
+        if view is not None and view.is_inside:
+            look(context, view, other=event.alt)
+        drawing.refresh()
+        redraw(context, "WINDOW", "UI")
 
 
 class Dragging(PinOperator):
@@ -85,12 +100,13 @@ class Dragging(PinOperator):
     def follow(self, context, event):
         if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
             self.drag.cancel(context)
-            return self.leave(context, {"CANCELLED"})
+            return self.leave(context, {"CANCELLED"}, event)
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             if not self.drag.has_moved:
-                return self.end(context, {"FINISHED"})
-            self.timer = host.start_events(context, TICK)
+                return self.end(context, {"FINISHED"}, event)
+            self.timer, self.drag.is_released = host.start_events(context, TICK), True
             sessions.update(context)
+            self.show(context, event)
             return {"RUNNING_MODAL"}
         steps = reach_steps(event)
         if steps:
@@ -123,23 +139,23 @@ class Dragging(PinOperator):
         """After the release: runs until the shape has settled, or until the next user event."""
         if event.type == "TIMER":
             sessions.update(context)
-            return self.end(context, {"FINISHED"}) if self.drag.is_settled() else {"RUNNING_MODAL"}
+            return self.end(context, {"FINISHED"}, event) if self.drag.is_settled() else {"RUNNING_MODAL"}
         if event.type in ("MOUSEMOVE", "INBETWEEN_MOUSEMOVE") or event.value == "RELEASE":
             return {"PASS_THROUGH"}
-        return self.end(context, {"FINISHED", "PASS_THROUGH"})
+        return self.end(context, {"FINISHED", "PASS_THROUGH"}, event)
 
-    def end(self, context, result):
+    def end(self, context, result, event):
         self.drag.end(context)
-        return self.leave(context, result)
+        return self.leave(context, result, event)
 
-    def leave(self, context, result):
+    def leave(self, context, result, event=None):
+        """Ends the drag; by an `event`, what lies under the cursor then is shown at once."""
         if self.timer is not None:
             host.stop_events(self.timer)
             self.timer = None
         if hover.drag is self.drag:
             hover.clear()
-        drawing.refresh()
-        redraw(context, "WINDOW", "UI")
+        self.show(context, event)
         return result
 
     def cancel(self, context):
@@ -190,12 +206,10 @@ class ARAPFIELDS_OT_pin_hover(PinOperator, bpy.types.Operator):
     bl_options = {"INTERNAL"}
 
     def invoke(self, context, event):
-        if context.region_data is not None and hover.drag is None:
+        if context.region_data is not None and hover.held is None:
             view = View(context, event)
             before = hover.target or hover.missed
-            hover.target, hover.missed = under(context, view, lights=True, other=event.alt), None
-            hover.pixel, hover.region = view.pixel, context.region.as_pointer()
-            hover.label = "" if hover.target is None else drawing.label(hover.target)
+            look(context, view, other=event.alt)
             drawing.refresh()
             if before is not None or hover.target is not None:
                 context.region.tag_redraw()
@@ -264,7 +278,7 @@ class ARAPFIELDS_OT_pin_anchor(PinOperator, bpy.types.Operator):
                 drag.of_entry(context, source, entry).end(context)
         except (UserError, ValueError) as error:
             return self.refuse(error)
-        redraw(context, "WINDOW", "UI")
+        self.show(context, event)
         return {"FINISHED"}
 
 
@@ -304,20 +318,20 @@ class ARAPFIELDS_OT_pin_delete(PinOperator, bpy.types.Operator):
 
     def invoke(self, context, event):
         if not self.under:
-            return self.execute(context)
+            return self.delete(context, pins.chosen(context), event)
         target = under(context, view_at_press(context, event))
         empty = target.empty.find() if target is not None and target.kind == "HANDLE" else None
-        return self.delete(context, empty)
+        return self.delete(context, empty, event)
 
     def execute(self, context):
         return self.delete(context, pins.chosen(context))
 
-    def delete(self, context, empty):
+    def delete(self, context, empty, event=None):
         if empty is None:
             return {"PASS_THROUGH"}
         pins.remove(context, owner_of(empty), empty)
         hover.clear()
-        redraw(context, "WINDOW", "UI")
+        self.show(context, event)
         return {"FINISHED"}
 
 

@@ -17,6 +17,7 @@ from ..core.geometry.spaces import transform
 from ..core.runtime import native
 from ..core.runtime.jobs import Item
 from ..core.settings.parameters import WRAP
+from ..handles.empties import free_colour
 from ..jobs.job_operator import JobOperator
 from ..pin_tool import screen
 from ..pin_tool.drawing import CIRCLE, DARK
@@ -45,6 +46,25 @@ def is_navigation(context, region, spot):
     aside = [r.x for r in context.area.regions if r.type == "UI" and r.width > 1 and r.x > region.x]
     right, top = min([region.x + region.width, *aside]), region.y + region.height
     return spot[0] > right - scale * NAVIGATION[0] and spot[1] > top - scale * NAVIGATION[1]
+
+
+class Half:
+    """The half of a pair that was clicked: (3,) its place in the world; None without one."""
+
+    place = None
+
+    def show(self, clicked):
+        """`clicked`: {which end: place}, of one end or none."""
+        self.place = next(iter(clicked.values()), None)
+
+    def clear(self):
+        self.show({})
+
+    def __bool__(self):
+        return self.place is not None
+
+
+half = Half()
 
 
 class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
@@ -138,6 +158,7 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
 
     def tell(self, context):
         names = [end.name for end in self.ends]
+        half.show(self.clicked)
         if not self.clicked:
             text = translated("Click a place on {source} or on {target}", source=names[0], target=names[1])
         else:
@@ -150,8 +171,14 @@ class ARAPFIELDS_OT_click_landmarks(SourceOperator, bpy.types.Operator):
         context.area.tag_redraw()
 
     def end(self, context):
+        half.clear()
         context.area.header_text_set(None)
+        context.area.tag_redraw()
         return {"FINISHED"}
+
+    def cancel(self, context):
+        """Called by Blender when the window closes or a file is loaded."""
+        half.clear()
 
 
 # Draws each pair of landmarks in the viewport: its number on a disc of its colour, at both ends.
@@ -165,9 +192,16 @@ def draw():
     if source is None or not context.space_data.overlay.show_overlays:
         return
     used, size = landmarks.used(source), (context.region.width, context.region.height)
-    perspective = np.array(context.region_data.perspective_matrix)
+    perspective, entries = (
+        np.array(context.region_data.perspective_matrix),
+        settings_of(source).wrap.landmarks,
+    )
     gpu.state.blend_set("ALPHA")
-    for number, entry in enumerate(settings_of(source).wrap.landmarks, 1):
+    if half:
+        spot = screen.project(perspective, size, half.place)[0]
+        if np.isfinite(spot).all():
+            disc(context, spot, free_colour(entries), str(len(entries) + 1))
+    for number, entry in enumerate(entries, 1):
         for item in (entry.rest, entry.on_target) if entry in used else ():
             place = item.matrix_world.translation
             if item == entry.rest:

@@ -23,7 +23,7 @@ if IN_BLENDER:
     from support.blender.wraps import SMALL, bar_and_target
 
     import addon
-    from addon.animation import caches
+    from addon.animation import caches, object_bake
     from addon.blender import host
     from addon.blender.object_references import source_of
     from addon.carried import operators as carried
@@ -35,7 +35,7 @@ if IN_BLENDER:
     from addon.handles import empties, operators
     from addon.jobs import display, job_operator
     from addon.jobs import operators as job_operators
-    from addon.jobs.job_operator import ModalRun
+    from addon.jobs.job_operator import JobOperator, ModalRun
     from addon.results import placement
     from addon.wrap.operators import ARAPFIELDS_OT_wrap
 
@@ -464,6 +464,69 @@ def test_a_bake_says_that_it_lost_a_handle():
     assert advanced(running) == {"CANCELLED"}
     assert running.said == "Bar changed while it was worked on; run again"
     assert not path.parent.exists()
+
+
+class Waiting(JobOperator if IN_BLENDER else object):
+    """A job that has no end of its own."""
+
+    title = "Wait"
+
+    def plan(self, context, source, weights):
+        return jobs.Item(source.name, wait_for_cancel)
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_a_job_whose_object_is_deleted_ends_at_once(hidden):
+    bar, _, _ = scenes.bar_with_handles()
+    scenes.activate(bar)
+    running = begun(Operator(Waiting))
+    advanced(running, lambda: jobs.running() and jobs.running().items)
+    bar.hide_set(hidden)
+    results = [running.advance(bpy.context) for _ in range(5)]
+    assert results == 5 * [{"RUNNING_MODAL"}] and not jobs.running().cancelled
+    scenes.delete(bar)
+    assert advanced(running) == {"CANCELLED"}
+    assert running.said == ["Bar was deleted while it was worked on"] and jobs.running() is None
+
+
+def test_a_job_of_two_objects_goes_on_for_the_one_that_is_left():
+    bar, other = scenes.bar(), scenes.bar("Other")
+    scenes.activate(other, bar)
+    running = begun(Operator(Waiting))
+    running.scope = "SELECTED"
+    advanced(running, lambda: jobs.running() and jobs.running().items)
+    scenes.delete(bar)
+    results = [running.advance(bpy.context) for _ in range(5)]
+    assert results == 5 * [{"RUNNING_MODAL"}] and not jobs.running().cancelled
+    jobs.running().cancel()
+    assert advanced(running) == {"CANCELLED"} and running.said == ["Wait cancelled"]
+
+
+def test_a_bake_whose_object_is_deleted_ends_and_loses_nothing():
+    """It solved all frames before it said so."""
+    bar, folder = saved_animation()
+    path = folder / "cache/scene~Scene~Bar.pc2"
+    assert advanced(begun(stepped(format="PC2", start=1, end=5, folder="//cache"))) == {"FINISHED"}
+    kept = path.read_bytes()
+    solve, solved = object_bake.ObjectBake.add, []
+
+    def add(self, frame, request, is_baked=True, task=None):
+        solved.append(frame)
+        end = time.monotonic() + 60
+        while frame == 3 and not task.cancelled and time.monotonic() < end:
+            time.sleep(0.001)
+        solve(self, frame, request, is_baked, task)
+
+    object_bake.ObjectBake.add = add
+    try:
+        running = begun(stepped(format="PC2", start=1, end=5, folder="//cache"))
+        advanced(running, lambda: 3 in solved)
+        scenes.delete(bar)
+        assert advanced(running) == {"CANCELLED"}
+    finally:
+        object_bake.ObjectBake.add = solve
+    assert running.said == "Bar was deleted while it was worked on" and solved == [1, 2, 3]
+    assert path.read_bytes() == kept and [one.name for one in path.parent.iterdir()] == [path.name]
 
 
 def swelling_bar_over_a_cube():

@@ -2,6 +2,7 @@
 """Pins: placed, dragged, undone."""
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ if IN_BLENDER:
     from addon.handles.empties import PALETTE, free_colour
     from addon.live import sessions
     from addon.live.live_solver import prefetch
-    from addon.pin_tool import drag, drawing, hover, pins, screen
+    from addon.pin_tool import drag, drawing, hover, operators, pins, screen
     from addon.solver import frame_solver
 
 pytestmark = pytest.mark.in_blender
@@ -361,6 +362,81 @@ def test_the_label_says_what_a_press_does():
     assert drawing.label(hover.under(bpy.context, from_above(-0.9))).startswith("Pins move Bar itself")
     texts = {drawing.keys(one, None) for one in (handle, ring, None)} | {drawing.keys(None, object())}
     assert len(texts) == 4 and "" in texts
+
+
+class InView:
+    """Blender's context as it is in a 3D view."""
+
+    region, region_data = SimpleNamespace(as_pointer=lambda: 1, x=0, y=0), object()
+
+    def __getattr__(self, name):
+        return getattr(bpy.context, name)
+
+
+@pytest.mark.parametrize("ends", ["released", "cancelled", "settling"])
+def test_the_status_bar_has_the_keys_as_soon_as_a_drag_ends(ends):
+    """It was empty until the mouse moved."""
+    bar = scenes.bar()
+    view = from_above(0.9)
+    view.pixel = (380, 200)  # where that place is
+    kept = operators.View, operators.host.start_events, operators.host.stop_events
+    operators.View = lambda context, event: view
+    operators.host.start_events = operators.host.stop_events = lambda *_: 1
+    dragged = drag.of_new_pin(bpy.context, bar, np.array([0.9, 0.0, 0.25]), 0.1)
+    dragged.has_moved = ends == "settling"
+    running = type("Dragged", (operators.Dragging,), {})()
+    running.drag, running.kind, running.timer, running.last = dragged, "MOVE", None, view.pixel
+    hover.hover.drag = dragged
+    context = InView()
+    end = SimpleNamespace(type="LEFTMOUSE", value="RELEASE", ctrl=False, alt=False)
+    if ends == "cancelled":
+        end.type, end.value = "ESC", "PRESS"
+    view.is_inside = hover.View.is_inside.fget(view)
+    try:
+        results = {"released": "FINISHED", "cancelled": "CANCELLED", "settling": "RUNNING_MODAL"}
+        assert running.modal(context, end) == {results[ends]}
+        assert hover.hover.target.kind == ("SURFACE" if ends == "cancelled" else "HANDLE")
+        assert drawing.status.text == drawing.keys(hover.hover.target, None) != ""
+        hover.hover.drag, view.pixel = dragged, (410, 200)  # over another region
+        view.is_inside = hover.View.is_inside.fget(view)
+        running.leave(context, None, end)
+        assert hover.hover.target is None and drawing.status.text == ""
+    finally:
+        operators.View, operators.host.start_events, operators.host.stop_events = kept
+        hover.hover.clear()
+        drawing.refresh()
+
+
+def test_what_a_press_does_is_said_anew_after_an_anchor_is_placed_and_deleted():
+    """The label told of the surface that was there before, until the mouse moved."""
+    scenes.bar()
+    view = from_above(0.9)
+    view.pixel, view.is_inside = (380, 200), True
+    event = SimpleNamespace(type="LEFTMOUSE", alt=False, mouse_prev_x=-1, mouse_prev_y=-1)
+    kept, operators.View = operators.View, lambda context, event: view
+    try:
+        for cls, under, label in (
+            (operators.ARAPFIELDS_OT_pin_anchor, False, "Choose Pin 1, an anchor"),
+            (operators.ARAPFIELDS_OT_pin_delete, True, "Pin Bar"),
+        ):
+            methods = {name: vars(cls)[name] for name in ("invoke", "delete") if name in vars(cls)}
+            pressed = type("Pressed", (operators.PinOperator,), methods | {"under": under})()
+            assert pressed.invoke(InView(), event) == {"FINISHED"}
+            assert hover.hover.label == label
+            assert drawing.status.text == drawing.keys(hover.hover.target, None)
+    finally:
+        operators.View = kept
+        hover.hover.clear()
+        drawing.refresh()
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"), [("TRANSFORM_OT_translate", True), ("ARAPFIELDS_OT_bake", False)]
+)
+def test_during_a_move_of_blenders_own_nothing_says_what_a_press_does(name, expected):
+    running = SimpleNamespace(window=SimpleNamespace(modal_operators=[SimpleNamespace(bl_idname=name)]))
+    assert drawing.is_transforming(running) == expected
+    assert not drawing.is_transforming(SimpleNamespace(window=None))
 
 
 # Where a pin's place is at rest, on the screen, and what it is called.

@@ -34,6 +34,7 @@ if IN_BLENDER:
     from addon.results import placement
     from addon.wrap import landmarks
     from addon.wrap.landmark_tools import ARAPFIELDS_OT_click_landmarks as Operator
+    from addon.wrap.landmark_tools import half
     from arapfields.cli import wrapping
 
 pytestmark = pytest.mark.in_blender
@@ -551,7 +552,10 @@ def clicker():
         event = SimpleNamespace(type="LEFTMOUSE", value="PRESS", mouse_x=500 + 100 * x, mouse_y=500 + 100 * z)
         return operator.modal(context, event), sorted(operator.clicked)
 
-    click.said = said
+    def key(name):
+        return operator.modal(context, SimpleNamespace(type=name, value="PRESS"))
+
+    click.said, click.key = said, key
     return item, click
 
 
@@ -579,6 +583,23 @@ def test_a_click_that_misses_gives_a_sign():
     assert said.pop(0)[0].startswith("Neither Bar nor Scan lies there. Click a place on Bar")
     click(0.0, 0.0)
     assert said == [("Click the same place on Scan. Backspace takes back, Enter ends",)]
+
+
+def test_the_first_click_of_a_pair_is_drawn_where_it_was():
+    """Nothing was seen of it until the second one."""
+    _, click = clicker()
+    assert not half
+    click(0.5, 0.1)
+    assert np.allclose(half.place, (0.5, -0.25, 0.1), atol=0.02)
+    click(3.0, 0.0)
+    assert not half
+    click(3.0, 0.0)
+    assert half.place[0] > 2.0
+    click.key("BACK_SPACE")
+    assert not half
+    click(0.0, 0.0)
+    click.key("ESC")
+    assert not half
 
 
 def test_landmarks_lie_on_the_shape_that_is_shown():
