@@ -153,15 +153,19 @@ InvalidInput for other shapes and values.)")
           "refuses.")
       .def(
           "save_gltf",
-          [](const Kept& self, const PathArgument& path, const std::string& name, Task* task) {
+          [](const Kept& self, const PathArgument& path, const std::string& name, const std::string& up,
+             Task* task) {
             const std::string place = as_path(path);
-            run_long(task, [&](const Progress& progress) { save_splats_gltf(place, *self, name, progress); });
+            require(up == "y" || up == "z", "up", up, "\"y\" or \"z\" is needed");
+            run_long(task, [&](const Progress& progress) {
+              save_splats_gltf(place, *self, name, up == "z", progress);
+            });
           },
-          "path"_a, "name"_a = "Splats", py::kw_only(), "task"_a = py::none(), R"(
+          "path"_a, "name"_a = "Splats", py::kw_only(), "up"_a = "y", "task"_a = py::none(), R"(
 Writes a binary glTF file (.glb) with the extension KHR_gaussian_splatting, in whole or not at all.
 
-Coordinates are written as they are; glTF's y is up, see transformed(). `name`: that of the object in it. OSError
-where the system refuses.)")
+`up`: the splats' axis that is up, "y" or "z"; glTF's is y, and those of z are turned. `name`: that of the object
+in it. OSError where the system refuses.)")
       .def(
           "transformed",
           [](const Kept& self, const ArrayArgument& matrix, Task* task) {

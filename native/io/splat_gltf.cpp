@@ -91,10 +91,29 @@ Json document_of(const GaussianSplats& splats, const std::vector<Attribute>& att
           {"buffers", {{{"byteLength", offset}}}}};
 }
 
+/// Splats whose z is up, turned to glTF's axes, with their own axes exchanged likewise.
+GaussianSplats with_y_up(const GaussianSplats& splats, const Progress& progress) {
+  Mat4 turn = Mat4::Zero();
+  turn(0, 0) = turn(1, 2) = turn(3, 3) = 1.0;
+  turn(2, 1) = -1.0;
+  GaussianSplats turned = transform_splats(splats, turn, progress);
+  for (Index i = 0; i < splats.size(); ++i) {
+    const Eigen::RowVector4f q = splats.rotations.row(i);
+    const Eigen::RowVector3f scales = splats.log_scales.row(i);
+    turned.rotations.row(i) << q[0], q[1], q[3], -q[2];
+    turned.log_scales.row(i) << scales[0], scales[2], scales[1];
+  }
+  return turned;
+}
+
 }  // namespace
 
 void save_splats_gltf(const std::string& path, const GaussianSplats& splats, const std::string& name,
-                      const Progress& progress) {
+                      bool z_up, const Progress& progress) {
+  if (z_up) {
+    save_splats_gltf(path, with_y_up(splats, progress.part(0.0, 0.4)), name, false, progress.part(0.4, 1.0));
+    return;
+  }
   splats.validate();
   require(splats.size() > 0, "splats", "none", "glTF needs at least one");
   const std::vector<Attribute> attributes = attributes_of(splats);

@@ -9,9 +9,12 @@
 namespace arapfields {
 
 /// Writes splats as a binary glTF file with one node of that name and the extension KHR_gaussian_splatting,
-/// in whole or not at all. Coordinates are written as they are; glTF's y is up. Throws InvalidInput for no
-/// splats and for more than the format has room for, FileError where the system refuses, and Cancelled.
+/// in whole or not at all. glTF's y is up: splats whose z is up are turned, with their colours; their own
+/// axes are exchanged too, as Blender's importer does on the way back, so that it gives the same rotations
+/// and scales. Throws InvalidInput for no splats and for more than the format has room for, FileError where
+/// the system refuses, and Cancelled.
 ARAPFIELDS_EXPORT void save_splats_gltf(const std::string& path, const GaussianSplats& splats,
-                                        const std::string& name, const Progress& progress = {});
+                                        const std::string& name, bool z_up = false,
+                                        const Progress& progress = {});
 
 }  // namespace arapfields

@@ -466,8 +466,8 @@ def splat_calls(things):
         "GaussianSplats": lambda: (af.GaussianSplats, list(SPLATS_GIVEN)),
         "GaussianSplats.save": lambda: (by_name(splats.save, "task"), ["/nonexistent/x", af.Task()]),
         "GaussianSplats.save_gltf": lambda: (
-            by_name(splats.save_gltf, "task"),
-            ["/nonexistent/x", "name", af.Task()],
+            by_name(splats.save_gltf, "up", "task"),
+            ["/nonexistent/x", "name", "z", af.Task()],
         ),
         "GaussianSplats.transformed": lambda: (
             by_name(splats.transformed, "task"),

@@ -452,7 +452,22 @@ def test_gltf_is_read_back(count, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["a.glb"]
 
 
+def test_splats_whose_z_is_up_are_turned_for_gltf(tmp_path):
+    given = splats(300)
+    given.save_gltf(tmp_path / "a.glb", up="z")
+    back, _ = written_splats.gltf(tmp_path / "a.glb")
+    turn = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    wanted, linear = given.transformed(turn), turn[:3, :3]
+    assert np.array_equal(back.centers, wanted.centers) and np.array_equal(back.harmonics, wanted.harmonics)
+    assert np.abs(covariances(back) - covariances(wanted)).max() < CLOSE
+    # Own axes are exchanged as those of space are, which Blender's importer takes back.
+    assert np.abs(axes(back.rotations) - linear @ axes(given.rotations) @ linear.T).max() < EXACT_AS_WRITTEN
+    assert np.abs(back.scales - given.scales[:, [0, 2, 1]]).max() < CLOSE
+
+
 def test_limits_of_gltf_are_named(tmp_path):
+    with pytest.raises(af.InvalidInput, match="up"):
+        splats(3).save_gltf(tmp_path / "a.glb", up="x")
     empty = af.GaussianSplats(*(np.zeros((0, *shape)) for shape in ((3,), (4,), (3,), (), (1, 3))))
     with pytest.raises(af.InvalidInput, match="splats"):
         empty.save_gltf(tmp_path / "a.glb")

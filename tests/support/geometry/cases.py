@@ -5,7 +5,6 @@ import functools
 
 import numpy as np
 from support.geometry.nudge import nudged
-from support.oracles import Network
 
 import arapfields as af
 
@@ -63,6 +62,8 @@ def bar_handles(degrees=60.0):
 @functools.cache
 def published_samples(path, count=20000, seed=0):
     """Uniform samples of a published network's zero set, with frame identity."""
+    from support.oracles import Network  # needs torch, which a Blender's Python may lack
+
     sdf = af.NeuralSdf.from_layers(*Network.published(path).layers)
     return af.sample_surface(sdf, count=count, seed=seed)
 
