@@ -83,7 +83,7 @@ status = Status()
 
 def refresh():
     """Shows the keys for what is under the cursor or dragged."""
-    status.show(keys(hover.target, hover.held))
+    status.show("" if is_press_taken(bpy.context) else keys(hover.target, hover.held))
 
 
 def watch():
@@ -130,10 +130,13 @@ def is_active(context):
     return tool is not None and tool.idname == TOOL and context.mode == "OBJECT"
 
 
-def is_transforming(context):
-    """Whether Blender's own Move, Rotate or Scale runs, to which a press belongs then."""
+OTHERS = "TRANSFORM_OT_", "ARAPFIELDS_OT_click_landmarks"  # operators that take presses while they run
+
+
+def is_press_taken(context):
+    """Whether a press belongs to another operator: to Blender's Move, Rotate or Scale, or to landmarks."""
     running = getattr(context.window, "modal_operators", ())
-    return any(operator.bl_idname.startswith("TRANSFORM_OT_") for operator in running)
+    return any(operator.bl_idname.startswith(OTHERS) for operator in running)
 
 
 class Brush:
@@ -181,7 +184,7 @@ def draw():
         return
     brush = Brush(context)
     gpu.state.blend_set("ALPHA")
-    target = hover.target if hover.held is None and not is_transforming(context) else None
+    target = hover.target if hover.held is None and not is_press_taken(context) else None
     if target is not None and target.kind == "SURFACE":
         draw_surface(brush, target)
     gpu.state.depth_test_set("NONE")
@@ -200,7 +203,7 @@ def draw_label():
     context, spot = bpy.context, hover.missed or hover.pixel
     if context.region_data is None or spot is None or hover.held is not None or not is_active(context):
         return
-    if is_transforming(context):
+    if is_press_taken(context):
         return
     text = translated("Nothing to pin here") if hover.missed else hover.label
     if not text or hover.region != context.region.as_pointer():

@@ -435,8 +435,8 @@ def test_what_a_press_does_is_said_anew_after_an_anchor_is_placed_and_deleted():
 )
 def test_during_a_move_of_blenders_own_nothing_says_what_a_press_does(name, expected):
     running = SimpleNamespace(window=SimpleNamespace(modal_operators=[SimpleNamespace(bl_idname=name)]))
-    assert drawing.is_transforming(running) == expected
-    assert not drawing.is_transforming(SimpleNamespace(window=None))
+    assert drawing.is_press_taken(running) == expected
+    assert not drawing.is_press_taken(SimpleNamespace(window=None))
 
 
 # Where a pin's place is at rest, on the screen, and what it is called.

@@ -237,6 +237,7 @@ LARGE = (
     "points",
 )
 LARGE += ("threads", "device", "subframes", "seed", "start", "end", "step", "seconds", "memory", "size")
+LARGE += ("share",)  # subdivide divides a mesh into millions of faces by a small one
 GROUPS = ("deform", "stylize", "wrap", "stiffness", "secondary", "contact", "bake", "skin", "fit", "pin")
 
 
