@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A Blender process that runs test functions on request, each in an empty file.
 
-Reads lines of JSON, {"file", "function", "arguments"}, and answers each with one line: "" or a traceback.
+Reads lines of JSON, {"file", "function", "arguments"}, and answers each with one line: "", a traceback, or why the test
+is skipped.
 """
 
 import ctypes
@@ -15,8 +16,10 @@ import traceback
 from pathlib import Path
 
 import bpy
+import pytest
 
 SAMPLES = 500  # a twelfth of live mode's default: these tests do not check the quality of solves
+SKIPPED = "skipped: "
 
 
 @functools.cache
@@ -40,6 +43,8 @@ def run(order):
             arguments["tmp_path"] = Path(arguments["tmp_path"])
         getattr(load(order["file"]), order["function"])(**arguments)
         return ""
+    except pytest.skip.Exception as skipped:
+        return SKIPPED + str(skipped)
     except BaseException:
         return traceback.format_exc()
     finally:
