@@ -37,7 +37,7 @@ endif
 NATIVE_TESTS := $(BUILD)/tests/native_tests
 export ARAPFIELDS_NATIVE_TESTS := $(NATIVE_TESTS)
 
-.PHONY: help setup build examples demo test test-slow test-rounding test-window test-windows test-arm64 fuzz fuzz-contact bench sanitize format lint wheels extension release blenders gallery docs clean
+.PHONY: help setup build examples demo test test-slow test-rounding test-window test-windows test-arm64 fuzz fuzz-contact bench sanitize format lint wheels extension release blenders test-blender gallery docs clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' Makefile | sed -E 's/:.*##/ -/'
@@ -243,6 +243,17 @@ $(NEWER): build/blenders/%/.ready:
 	$(PYTHON313) -m venv build/blenders/$*
 	build/blenders/$*/bin/python -m pip install -q "bpy==$*.*"
 	@touch $@
+
+# The library is that of the wheel, which serves all their Pythons. TESTS="tests/blender/… …" names some.
+VERSION := 5.3
+OTHER := build/blenders/$(VERSION)
+OTHER_SITE := build/blenders/site
+test-blender: setup wheels blenders  ## the tests of tests/blender in another Blender: VERSION=5.3 (or 5.2, 4.2)
+	@test -x $(OTHER)/bin/python || $(call lacks,No Blender $(VERSION) in build/blenders)
+	$(OTHER)/bin/python -m pip install -q --disable-pip-version-check -r tests/support/blender/requirements.txt
+	rm -rf $(OTHER_SITE) && $(PIP) -q --no-deps --target $(OTHER_SITE) dist/arapfields-*cp311*manylinux*_x86_64.whl
+	ARAPFIELDS_WORKER=$(abspath $(OTHER)/bin/python) PYTHONPATH=$(abspath $(OTHER_SITE)) \
+	  $(ALL_TESTS) -rs -m "not slow" --ignore tests/blender/test_extension.py $(or $(filter-out tests,$(TESTS)),tests/blender)
 
 gallery: build $(VENV)/.tools  ## the documentation's pictures, rendered by the code
 	$(PIP) -q -r docs/requirements.txt

@@ -57,15 +57,12 @@ class SourceReader:
 
     def read_setup(self, context):
         """Coroutine (core/runtime/jobs.py) that reads the vertex groups, and makes `setup`."""
-        source, in_place = self.reference.get(), self.surface.in_place
-        if self.kind == "STYLIZE":
-            held = style_settings.group_names(source, settings_of(source).stylize)
-        else:
-            held = empties.group_names(source)
-        soft, region, further = secondary_motion.group_names(source), None, {}
-        weights = yield from vertex_groups.read_weights(context, source, [*held, *soft], in_place)
+        in_place, names, weights = self.surface.in_place, None, {}
+        while names != (now := self.group_names()):  # again where one is renamed meanwhile
+            names = now
+            weights = yield from vertex_groups.read_weights(context, self.reference.get(), names, in_place)
         source = self.reference.get()
-        settings = settings_of(source)
+        settings, soft, region, further = settings_of(source), secondary_motion.group_names(source), None, {}
         if self.kind == "DEFORM" or (uses_handles(settings, self.kind) and empties.used(source)):
             self.read_handles(source, weights)
         if self.kind == "STYLIZE":
@@ -84,6 +81,15 @@ class SourceReader:
             fps=secondary_motion.frame_rate(context.scene),
             **further,
         )
+
+    def group_names(self):
+        """The vertex groups in use, by their present names."""
+        source = self.reference.get()
+        if self.kind == "STYLIZE":
+            held = style_settings.group_names(source, settings_of(source).stylize)
+        else:
+            held = empties.group_names(source)
+        return [*held, *secondary_motion.group_names(source)]
 
     def read_handles(self, source, weights=None):
         """Reads the handles at rest; `weights`: {vertex group: weights}, if any handle has one."""

@@ -19,6 +19,7 @@ from support.blender.inside import require_bpy
 ROOT = Path(__file__).resolve().parents[2]
 WORKER = shlex.split(os.environ.get("ARAPFIELDS_WORKER", ""))
 PROGRAM = ROOT / "tests/support/blender/worker.py"
+SKIPPED = "skipped: "  # begins an answer, as there
 
 
 def isolated(folder):
@@ -55,8 +56,11 @@ class Blender:
         answer = next((line for line in self.process.stdout if line.startswith('"')), "")  # after the banner
         if not answer:
             pytest.fail(f"Blender ended with status {self.process.wait()}")
-        if json.loads(answer):
-            pytest.fail(json.loads(answer), pytrace=False)
+        said = json.loads(answer)
+        if said.startswith(SKIPPED):
+            pytest.skip(said.removeprefix(SKIPPED))
+        if said:
+            pytest.fail(said, pytrace=False)
 
     def close(self):
         if self.process is not None:

@@ -17,6 +17,7 @@ if IN_BLENDER:
     from addon.core.runtime import jobs
     from addon.live import sessions
     from addon.solver import frame_solver
+    from addon.solver.source_reader import SourceReader
 
 pytestmark = pytest.mark.in_blender
 
@@ -301,6 +302,18 @@ def test_a_renamed_bone_is_undone_and_redone_while_live():
         bar = bpy.data.objects["Bar"]
         assert bpy.data.armatures[0].bones[1].name == name and sessions.is_live(bar)
         assert np.abs(scenes.world_points(bar) - shown).max() < STOPPED * np.ptp(shown, axis=0).max()
+
+
+def test_a_bone_that_is_renamed_while_its_weights_are_read_is_read_again():
+    bar, rig = rigged_bar()
+    bpy.ops.arapfields.add_bones()
+    reader = SourceReader(bpy.context, bar, "DEFORM", in_place=True)
+    reading = reader.read_setup(bpy.context)
+    next(reading)
+    rig.data.bones["Second"].name = "Hand"
+    list(reading)
+    assert [entry.group for entry in bar.arapfields.handles] == ["Bone", "Hand"]
+    assert len(reader.handles) == 2 and reader.setup is not None
 
 
 def test_a_renamed_armature_modifier_is_on_again_after_live():

@@ -12,7 +12,7 @@ if IN_BLENDER:
     from mathutils import Vector
     from support.blender import scenes, wraps
     from support.blender.live import step
-    from support.blender.riders import body, link, rider, shown, taken
+    from support.blender.riders import WITH_PENCILS, body, link, rider, shown, taken
     from support.blender.scenes import camera, delete
     from support.blender.skins import rigged_bar
 
@@ -396,7 +396,8 @@ def test_what_hangs_on_a_posed_bone_goes_with_a_sequence_after_a_wrap():
 @pytest.mark.parametrize("format", ["PC2", "KEYS"])
 def test_all_are_baked_at_once(format):
     bar, moving = body()
-    items = [rider(kind) for kind in ("MESH", "CURVE", "EMPTY", "ARMATURE", "CURVES", "GREASEPENCIL")]
+    kinds = ["MESH", "CURVE", "EMPTY", "ARMATURE", "CURVES", *(["GREASEPENCIL"] if WITH_PENCILS else [])]
+    items = [rider(kind) for kind in kinds]
     bpy.context.view_layer.update()
     rest = [shown(item) for item in items]
     scenes.activate(*items, bar)

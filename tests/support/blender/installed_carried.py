@@ -29,14 +29,14 @@ def check(items, rest, shift, what):
 
 def use():
     from support.blender import scenes
-    from support.blender.riders import body, rider, shown
+    from support.blender.riders import WITH_PENCILS, body, rider, shown
 
     sessions = importlib.import_module(f"{installed.MODULE}.live.sessions")
     bpy.ops.wm.read_homefile(use_empty=True)
     bpy.context.preferences.edit.use_global_undo = True
     bar, moving = body()
     kinds = ["MESH", "CURVES", "CURVE", "LATTICE", "EMPTY", "ARMATURE"]
-    kinds += ["GREASEPENCIL"] if hasattr(bpy.data, "grease_pencils_v3") or bpy.app.version >= (5, 0) else []
+    kinds += ["GREASEPENCIL"] if WITH_PENCILS else []
     items = [rider(kind).name for kind in kinds]
     bpy.context.view_layer.update()
     rest = [shown(bpy.data.objects[name]) for name in items]

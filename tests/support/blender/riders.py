@@ -7,6 +7,9 @@ from support.blender import scenes
 
 import arapfields
 
+# Whether Grease Pencil has its points as attributes: from 4.3 on, renamed in 5.0.
+WITH_PENCILS = hasattr(bpy.data, "grease_pencils_v3") or bpy.app.version >= (5, 0)
+
 
 def body():
     """(bar, moving): a bar that carries nothing, and the handle of its right end."""
@@ -35,6 +38,10 @@ def rider(kind):
         curves.attributes["position"].data.foreach_set("vector", (points - at).astype(np.float32).ravel())
         return link("Hair", curves, at)
     if kind == "GREASEPENCIL":
+        if not WITH_PENCILS:
+            import pytest  # some Blenders that use riders without this kind have none
+
+            pytest.skip("Grease Pencil has points as attributes from Blender 4.3 on")
         pencils = getattr(bpy.data, "grease_pencils_v3", bpy.data.grease_pencils)  # renamed in 5.0
         pencil = pencils.new("Ink")
         drawing = pencil.layers.new("Lines").frames.new(1).drawing

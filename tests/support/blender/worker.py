@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A Blender process that runs test functions on request, each in an empty file.
 
-Reads lines of JSON, {"file", "function", "arguments"}, and answers each with one line: "" or a traceback.
+Reads lines of JSON, {"file", "function", "arguments"}, and answers each with one line: "", a traceback, or
+why the test is skipped.
 """
 
 import ctypes
@@ -15,8 +16,10 @@ import traceback
 from pathlib import Path
 
 import bpy
+import pytest
 
 SAMPLES = 500  # a twelfth of live mode's default: these tests do not check the quality of solves
+SKIPPED = "skipped: "
 
 
 @functools.cache
@@ -40,6 +43,8 @@ def run(order):
             arguments["tmp_path"] = Path(arguments["tmp_path"])
         getattr(load(order["file"]), order["function"])(**arguments)
         return ""
+    except pytest.skip.Exception as skipped:
+        return SKIPPED + str(skipped)
     except BaseException:
         return traceback.format_exc()
     finally:
@@ -51,6 +56,8 @@ def main():
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # Blender's output must not mix with the answers
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    # PyPI's bpy leaves out of the path what Blender itself has there, such as USD.
+    sys.path.extend(map(str, Path(bpy.__file__).parent.glob("*/python/lib/python*/site-packages")))
     for line in sys.stdin:
         print(json.dumps(run(json.loads(line))), file=answers, flush=True)
     # At the end of the process threads of Blender's may deadlock, under Wine also in _exit.
