@@ -12,11 +12,26 @@ void require_moved(PointsIn vertices, PointsIn moved) {
   require(moved.allFinite(), "moved", "some coordinates are NaN or infinite", "all must be finite");
 }
 
+namespace {
+
+/// `rotation_of`: that of a node.
+template <class RotationOf>
+bool faces_away(const WeldedSurface& surface, Index triangle, const Points& positions,
+                const RotationOf& rotation_of) {
+  Mat3 sum = Mat3::Zero();
+  for (int k = 0; k < 3; ++k) sum += rotation_of(surface.corners()(triangle, k));
+  return (sum * surface.normal(triangle, surface.rest())).dot(surface.normal(triangle, positions)) < 0.0;
+}
+
+}  // namespace
+
 bool is_folded(const WeldedSurface& surface, Index triangle, const Points& positions,
                const std::vector<Mat3>& rotations) {
-  Mat3 sum = Mat3::Zero();
-  for (int k = 0; k < 3; ++k) sum += rotations[surface.corners()(triangle, k)];
-  return (sum * surface.normal(triangle, surface.rest())).dot(surface.normal(triangle, positions)) < 0.0;
+  return faces_away(surface, triangle, positions, [&](Index i) -> const Mat3& { return rotations[i]; });
+}
+
+bool is_folded(const WeldedSurface& surface, Index triangle, const Points& positions) {
+  return faces_away(surface, triangle, positions, [&](Index i) { return surface.rotation(i, positions); });
 }
 
 std::vector<char> all_folded(const WeldedSurface& surface, const Points& positions,

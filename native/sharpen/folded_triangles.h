@@ -19,6 +19,9 @@ ARAPFIELDS_EXPORT std::vector<Index> folded_triangles(PointsIn vertices, Triangl
 bool is_folded(const WeldedSurface& surface, Index triangle, const Points& positions,
                const std::vector<Mat3>& rotations);
 
+/// The same with the rotations of its corners that fit these positions best.
+bool is_folded(const WeldedSurface& surface, Index triangle, const Points& positions);
+
 /// The triangles of the surface that are folded: one char for each.
 std::vector<char> all_folded(const WeldedSurface& surface, const Points& positions,
                              const std::vector<Mat3>& rotations);

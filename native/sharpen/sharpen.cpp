@@ -33,15 +33,15 @@ constexpr int rings_around = 2;
 /// which it is part of a detail, and from which on it is not; and the share of the style's weight for
 /// details.
 constexpr double detail_reach = 0.02, on_detail = 0.85, off_detail = 0.96, detail_weight = 0.1;
-/// Share of the last step by which the next one starts ahead: half as many steps then do as well.
-constexpr double momentum = 0.6;
+/// Share of the last step by which the next one starts ahead: twelve steps then do as well as sixteen at 0.6.
+constexpr double momentum = 0.8;
 /// Residual of a global step's system, relative to that at its start.
 constexpr double solve_tolerance = 0.05;
 /// Rounds in which folded triangles are opened, and in which what lies around them gets its shape back, in
-/// sweeps: after some rounds they are opened again, and a ring more follows. And the share of the whole that
-/// is taken back by half at last.
-constexpr int most_openings = 8, most_relaxations = 40, rounds_a_ring = 4, relaxing_sweeps = 8;
-constexpr double least_share = 0.1;
+/// sweeps: after some rounds they are opened again, and a ring more follows. And rings in which what is still
+/// folded gets its shape at rest, at first and at most: twice as many each time.
+constexpr int most_openings = 8, most_relaxations = 16, rounds_a_ring = 4, relaxing_sweeps = 8;
+constexpr int first_rings_at_rest = 4, most_rings_at_rest = 64;
 /// Bytes that a vertex takes with its two triangles, at most.
 constexpr double bytes_per_vertex = 2000.0;
 constexpr Index sharpen_grain = 4096;
@@ -55,8 +55,9 @@ struct StyleAtTriangles {
   double lead = 1.0;  // of the nearest preferred normal's cosine, from which on it pulls wholly
 
   StyleAtTriangles(const Style& style, const WeldedSurface& surface, const SharpenOptions& options) {
-    const StyleAtSamples at =
-        StyleAtSamples::of(style, unit_rows(surface.normals(surface.rest())), options.sharpness);
+    Points normals;
+    surface.normals(surface.rest(), normals);
+    const StyleAtSamples at = StyleAtSamples::of(style, unit_rows(normals), options.sharpness);
     factors = at.weights;
     share = at.share(options.strength);
     targets = at.targets;
@@ -94,8 +95,8 @@ struct StyleAtTriangles {
 };
 
 /// (k,3) unit normals at the nodes: Σ of those of the triangles around, (m',3) by area.
-Points normals_at_nodes(const WeldedSurface& surface, const Points& normals) {
-  Points result(surface.nodes(), 3);
+void normals_at_nodes(const WeldedSurface& surface, const Points& normals, Points& result) {
+  result.resize(surface.nodes(), 3);
   parallel_for(0, surface.nodes(), sharpen_grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
@@ -103,14 +104,14 @@ Points normals_at_nodes(const WeldedSurface& surface, const Points& normals) {
       result.row(i) = sum.normalized();
     }
   });
-  return result;
 }
 
-/// (m',3) unit normals of the surface around each triangle, some rings far, from those by area.
-Points normals_around(const WeldedSurface& surface, const Points& normals) {
-  Points result = normals;
+/// (m',3) unit normals of the surface around each triangle, some rings far, from those by area; `at_nodes`:
+/// room for those at the nodes.
+void normals_around(const WeldedSurface& surface, const Points& normals, Points& at_nodes, Points& result) {
+  result.resize(surface.triangles(), 3);
   for (int ring = 0; ring < rings_around; ++ring) {
-    const Points at_nodes = normals_at_nodes(surface, result);
+    normals_at_nodes(surface, ring == 0 ? normals : result, at_nodes);
     parallel_for(0, surface.triangles(), sharpen_grain, [&](Index begin, Index end) {
       for (Index t = begin; t < end; ++t) {
         Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
@@ -119,25 +120,32 @@ Points normals_around(const WeldedSurface& surface, const Points& normals) {
       }
     });
   }
-  return result;
 }
 
 /// (m') 1 where triangles at rest face as the surface around them does on average, down to 0 for those of
 /// details that the style's faces would flatten.
 Vector plainness(const WeldedSurface& surface, const Progress& progress) {
-  const Points normals = surface.normals(surface.rest());
+  Points normals, at_nodes;
+  surface.normals(surface.rest(), normals);
+  normals_at_nodes(surface, normals, at_nodes);
   Vector areas = Vector::Zero(surface.nodes());
   parallel_for(0, surface.nodes(), sharpen_grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i)
       surface.around(i, [&](Index t, int) { areas[i] += normals.row(t).norm() / 6.0; });
   });
-  const Points at_nodes = normals_at_nodes(surface, normals);
   const double reach = detail_reach * diagonal_of(surface.rest());
   const Vector bound = areas / (reach * reach);
   const std::vector<char> none(surface.nodes(), 0);
   SurfaceLaplacian laplacian(surface, Vector::Ones(surface.triangles()), none, progress, bound);
-  Points smoothed = at_nodes;
-  laplacian.solve(Points::Zero(surface.nodes(), 3), at_nodes, solve_tolerance, smoothed);
+  Points residual(surface.nodes(), 3), smoothed = at_nodes;
+  parallel_for(0, surface.nodes(), sharpen_grain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      Vec3 sum = Vec3::Zero();
+      surface.edges(i, [&](Index j, double half) { sum += half * (at_nodes.row(j) - at_nodes.row(i)); });
+      residual.row(i) = sum;
+    }
+  });
+  laplacian.solve(residual, at_nodes, solve_tolerance, smoothed);
   Vector result(surface.triangles());
   parallel_for(0, surface.triangles(), sharpen_grain, [&](Index begin, Index end) {
     for (Index t = begin; t < end; ++t) {
@@ -166,32 +174,32 @@ class Finish {
         limits_(contact, start_, progress),
         laplacian_(surface, (factors.array() + 2.0).matrix(), held, progress),
         progress_(progress) {
-    begin_at(start_);
+    surface_.rotations(start_, rotations_);
   }
 
   void step() {
     if (before_.rows() > 0) {
-      Points ahead = positions_ + momentum * (positions_ - before_);
+      before_ = positions_ + momentum * (positions_ - before_);
       std::swap(before_, positions_);
-      std::swap(ahead, positions_);
       surface_.rotations(positions_, rotations_);
     } else {
       before_ = positions_;
     }
-    set_right_hand_side();
-    laplacian_.solve(right_, start_, solve_tolerance, positions_);
+    set_residual();
+    laplacian_.solve(residual_, start_, solve_tolerance, positions_);
     if (!limits_.any()) return;
     // What has come to an obstacle stays there, and the rest gives way.
+    const Points solution = positions_;
     std::vector<char> kept = limits_.keep(positions_);
     if (std::find(kept.begin(), kept.end(), 1) == kept.end()) return;
     for (std::size_t i = 0; i < kept.size(); ++i) kept[i] = kept[i] || held_[i];
-    laplacian_.solve(right_, start_, solve_tolerance, positions_, kept);
+    laplacian_.solve_further(solution, kept, solve_tolerance, positions_);
     limits_.keep(positions_);
   }
 
   /// Takes start and result this share of the way from rest.
   void go_part_way(double share) {
-    begin_at(surface_.rest() + share * (start_ - surface_.rest()));
+    start_ = surface_.rest() + share * (start_ - surface_.rest());
     positions_ = surface_.rest() + share * (positions_ - surface_.rest());
   }
 
@@ -203,20 +211,21 @@ class Finish {
   }
 
   /// Opens triangles that are folded, one vertex of each at a time; where that does not help, gives what lies
-  /// around them its former shape, in more and more rings by turns with the former; at last takes the whole
-  /// back, if some were not folded at the start.
+  /// around them its former shape, in more and more rings by turns with the former. What then is folded
+  /// gets its shape at rest, in wider and wider rings by turns with openings. If that leaves what was not
+  /// folded at the start, all goes back there.
   void spare_folds() {
     surface_.rotations(positions_, rotations_);
     std::vector<std::int32_t> found = folded();
-    double share = 1.0;
+    int rings = first_rings_at_rest;
     for (int round = 0; !found.empty(); ++round) {
       progress_.check();
       std::vector<std::int32_t> moved;
-      const bool goes_on = round < most_openings + most_relaxations;
-      if (round < most_openings || (goes_on && round % rounds_a_ring == 0)) {
+      const bool relaxes = round < most_openings + most_relaxations;
+      if (round < most_openings || (round % rounds_a_ring == 0) == relaxes) {
         for (const std::int32_t t : found)
           if (const std::int32_t node = open(t); node >= 0) moved.push_back(node);
-      } else if (goes_on) {
+      } else if (relaxes) {
         for (const std::int32_t t : found) {
           const std::vector<std::int32_t> nodes =
               nodes_around(t, 1 + (round - most_openings) / rounds_a_ring);
@@ -224,15 +233,16 @@ class Finish {
           moved.insert(moved.end(), nodes.begin(), nodes.end());
         }
       } else {
-        std::erase_if(found, [&](std::int32_t t) { return folded_before_[t]; });
-        if (found.empty()) break;
-        const double smaller = share > least_share ? 0.5 * share : 0.0;
-        positions_ = start_ + smaller / share * (positions_ - start_);
-        share = smaller;
-        limits_.keep(positions_);
-        surface_.rotations(positions_, rotations_);
-        found = folded();
-        continue;
+        if (rings > most_rings_at_rest) {
+          const auto before = [&](std::int32_t t) { return is_folded(surface_, t, start_); };
+          if (!std::all_of(found.begin(), found.end(), before)) positions_ = start_;
+          return;
+        }
+        for (const std::int32_t t : found) {
+          const std::vector<std::int32_t> nodes = set_back(t, rings);
+          moved.insert(moved.end(), nodes.begin(), nodes.end());
+        }
+        rings *= 2;
       }
       if (limits_.any()) {
         const std::vector<char> kept = limits_.keep(positions_);
@@ -246,14 +256,10 @@ class Finish {
   const Points& positions() const { return positions_; }
 
  private:
-  void begin_at(Points start) {
-    start_ = std::move(start);
-    surface_.rotations(start_, rotations_);
-    folded_before_ = all_folded(surface_, start_, rotations_);
-  }
-
   /// The shape that a triangle gets back: that at the start, or where it is folded there, at rest.
-  const Points& shape_of(Index triangle) const { return folded_before_[triangle] ? surface_.rest() : start_; }
+  const Points& shape_of(Index triangle) const {
+    return is_folded(surface_, triangle, start_) ? surface_.rest() : start_;
+  }
 
   std::vector<std::int32_t> folded() const {
     const std::vector<char> now = all_folded(surface_, positions_, rotations_);
@@ -284,8 +290,10 @@ class Finish {
     return result;
   }
 
-  /// Nodes within that many rings of a triangle.
-  std::vector<std::int32_t> nodes_around(Index triangle, int rings) const {
+  /// Nodes within that many rings of a triangle, from the inner ones on; `first_of_ring`: of the second one
+  /// on, where each begins.
+  std::vector<std::int32_t> nodes_around(Index triangle, int rings,
+                                         std::vector<std::size_t>* first_of_ring = nullptr) const {
     std::vector<std::int32_t> result;
     std::unordered_set<std::int32_t> reached;
     const auto reach = [&](Index t) {
@@ -294,35 +302,57 @@ class Finish {
           result.push_back(node);
     };
     reach(triangle);
-    for (std::size_t from = 0, ring = 1; ring < static_cast<std::size_t>(rings); ++ring)
-      for (const std::size_t end = result.size(); from < end; ++from)
-        surface_.around(result[from], [&](Index t, int) { reach(t); });
+    std::size_t from = 0;
+    for (int ring = 1; ring < rings && from < result.size(); ++ring) {
+      const std::size_t end = result.size();
+      if (first_of_ring) first_of_ring->push_back(end);
+      for (; from < end; ++from) surface_.around(result[from], [&](Index t, int) { reach(t); });
+    }
     return result;
+  }
+
+  /// The rotation that fits the edges of nodes best, from this shape on.
+  Mat3 turn_of(const std::vector<std::int32_t>& nodes, const Points& shape) const {
+    Mat3 spread = Mat3::Zero();
+    for (const std::int32_t node : nodes)
+      surface_.edges(node, [&](Index j, double weight) {
+        spread += weight * (positions_.row(j) - positions_.row(node)).transpose() *
+                  (shape.row(j) - shape.row(node));
+      });
+    return closest_rotation(spread);
+  }
+
+  /// Gives a triangle its shape at rest, moved as a whole, and what is around it the less of it the
+  /// farther it is, in this many rings. Returns the nodes.
+  std::vector<std::int32_t> set_back(Index triangle, int rings) {
+    std::vector<std::size_t> first_of_ring;
+    const std::vector<std::int32_t> nodes = nodes_around(triangle, rings, &first_of_ring);
+    const Mat3 turn = turn_of(nodes, surface_.rest());
+    Vec3 before = Vec3::Zero(), now = Vec3::Zero();
+    for (const std::int32_t node : nodes) {
+      before += surface_.rest().row(node) / static_cast<double>(nodes.size());
+      now += positions_.row(node) / static_cast<double>(nodes.size());
+    }
+    std::size_t ring = 0;
+    for (std::size_t at = 0; at < nodes.size(); ++at) {
+      while (ring < first_of_ring.size() && at >= first_of_ring[ring]) ++ring;
+      if (held_[nodes[at]]) continue;
+      const Vec3 place = now + turn * (surface_.rest().row(nodes[at]).transpose() - before);
+      positions_.row(nodes[at]) +=
+          (1.0 - static_cast<double>(ring) / rings) * (place.transpose() - positions_.row(nodes[at]));
+    }
+    return nodes;
   }
 
   /// Gives nodes, turned as one, this shape, as far as what is around them lets.
   void relax(const std::vector<std::int32_t>& nodes, const Points& shape) {
-    const auto edges = [&](std::int32_t node, auto&& visit) {
-      surface_.around(node, [&](Index t, int k) {
-        for (int other = 1; other < 3; ++other) {
-          const int l = (k + other) % 3;
-          visit(surface_.corners()(t, l), surface_.weights()(t, 3 - k - l));
-        }
-      });
-    };
-    Mat3 spread = Mat3::Zero();
-    for (const std::int32_t node : nodes)
-      edges(node, [&](Index j, double weight) {
-        spread += weight * (positions_.row(j) - positions_.row(node)).transpose() *
-                  (shape.row(j) - shape.row(node));
-      });
-    const Mat3 turn = closest_rotation(spread);
+    const Mat3 turn = turn_of(nodes, shape);
     for (int sweep = 0; sweep < relaxing_sweeps; ++sweep)
       for (const std::int32_t node : nodes) {
         if (held_[node]) continue;
         Vec3 sum = Vec3::Zero();
         double weights = 0.0;
-        edges(node, [&](Index j, double weight) {
+        surface_.edges(node, [&](Index j, double weight) {
           const Vec3 edge = shape.row(node) - shape.row(j), place = positions_.row(j);
           sum += weight * (place + turn * edge);
           weights += weight;
@@ -363,36 +393,40 @@ class Finish {
     return corner(apex);
   }
 
-  /// Of the global step: Σ of each node's edges of w ((R_i + R_j) e + λ p), p an edge without its part along
-  /// the direction that pulls.
-  void set_right_hand_side() {
-    const Points normals = surface_.normals(positions_), around = normals_around(surface_, normals);
+  /// Of the global step at these positions: Σ of each node's edges of w ((R_i + R_j) e − 2 d), d the edge
+  /// now, and of its triangles' of −λ w (d·p) p, p the direction that pulls.
+  void set_residual() {
+    surface_.normals(positions_, normals_);
+    normals_around(surface_, normals_, at_nodes_, around_);
     pulls_.resize(surface_.triangles(), 3);  // the directions, by the root of how much they pull
+    along_.resize(surface_.triangles(), 3);  // and how far, at each corner
     parallel_for(0, surface_.triangles(), sharpen_grain, [&](Index begin, Index end) {
       for (Index t = begin; t < end; ++t) {
-        const Vec3 own = normals.row(t).normalized(), mean = around.row(t);
+        const Vec3 own = normals_.row(t).normalized(), mean = around_.row(t);
         const auto [pulling, pull] = style_.direction(t, own, (own + plain_[t] * (mean - own)).normalized());
-        pulls_.row(t) = std::sqrt(pull) * pulling;
+        const Vec3 along = std::sqrt(pull) * pulling;
+        Vec3 heights;
+        for (int k = 0; k < 3; ++k) heights[k] = positions_.row(surface_.corners()(t, k)) * along;
+        const Vec3 weights = factors_[t] * surface_.weights().row(t);
+        pulls_.row(t) = along;
+        for (int k = 0; k < 3; ++k) {
+          const int next = (k + 1) % 3, last = (k + 2) % 3;
+          along_(t, k) =
+              weights[last] * (heights[k] - heights[next]) + weights[next] * (heights[k] - heights[last]);
+        }
       }
     });
-    right_.resize(surface_.nodes(), 3);
+    residual_.resize(surface_.nodes(), 3);
     parallel_for(0, surface_.nodes(), sharpen_grain, [&](Index begin, Index end) {
       for (Index i = begin; i < end; ++i) {
         Vec3 sum = Vec3::Zero();
-        for (std::int32_t at = surface_.first_neighbour()[i]; at < surface_.first_neighbour()[i + 1]; ++at) {
-          const std::int32_t j = surface_.neighbours()[at];
-          const Vec3 edge = surface_.rest().row(i) - surface_.rest().row(j);
-          sum += surface_.edge_weights()[at] * ((rotations_[i] + rotations_[j]) * edge);
-        }
-        surface_.around(i, [&](Index t, int k) {
-          const Vec3 pull = pulls_.row(t);
-          for (int other = 1; other < 3; ++other) {
-            const int l = (k + other) % 3;
-            const Vec3 edge = positions_.row(i) - positions_.row(surface_.corners()(t, l));
-            sum += factors_[t] * surface_.weights()(t, 3 - k - l) * (edge - edge.dot(pull) * pull);
-          }
+        surface_.edges(i, [&](Index j, double half) {
+          const Vec3 rest = surface_.rest().row(i) - surface_.rest().row(j);
+          const Vec3 now = positions_.row(i) - positions_.row(j);
+          sum += half * ((rotations_[i] + rotations_[j]) * rest - 2.0 * now);
         });
-        right_.row(i) = sum;
+        surface_.around(i, [&](Index t, int k) { sum -= along_(t, k) * pulls_.row(t); });
+        residual_.row(i) = sum;
       }
     });
   }
@@ -404,10 +438,9 @@ class Finish {
   Points start_;
   Points positions_, before_;
   std::vector<Mat3> rotations_;
-  std::vector<char> folded_before_;
   ContactLimits limits_;
   SurfaceLaplacian laplacian_;
-  Points pulls_, right_;  // of the global step
+  Points normals_, at_nodes_, around_, pulls_, along_, residual_;  // of the global step
   const Progress& progress_;
 };
 

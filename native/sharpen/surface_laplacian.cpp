@@ -208,14 +208,34 @@ double SurfaceLaplacian::precondition(const Points& residual, Points& step) {
   });
 }
 
-void SurfaceLaplacian::solve(const Points& right, const Points& places, double tolerance, Points& x,
-                             const std::vector<char>& still) {
-  still_ = still.empty() ? held_ : still;
-  multiply(x, residual_);
+void SurfaceLaplacian::solve(const Points& residual, const Points& places, double tolerance, Points& x) {
+  still_ = held_;
+  residual_.resize(x.rows(), 3);
   parallel_for(0, x.rows(), laplacian_grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i)
-      if (!still_[i]) residual_.row(i) = right.row(i) + bound_[i] * places.row(i) - residual_.row(i);
+      if (still_[i])
+        residual_.row(i).setZero();
+      else
+        residual_.row(i) = residual.row(i) + bound_[i] * (places.row(i) - x.row(i));
   });
+  reduce_residual(tolerance, x);
+}
+
+void SurfaceLaplacian::solve_further(const Points& solution, const std::vector<char>& still, double tolerance,
+                                     Points& x) {
+  multiply(x - solution, image_);
+  still_ = still;
+  parallel_for(0, x.rows(), laplacian_grain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i)
+      if (still_[i])
+        residual_.row(i).setZero();
+      else
+        residual_.row(i) -= image_.row(i);
+  });
+  reduce_residual(tolerance, x);
+}
+
+void SurfaceLaplacian::reduce_residual(double tolerance, Points& x) {
   double product_now = precondition(residual_, step_);
   direction_ = step_;
   const double enough = tolerance * tolerance * product_now;

@@ -21,11 +21,13 @@ class SurfaceLaplacian {
   SurfaceLaplacian(const WeldedSurface& surface, const Vector& factors, const std::vector<char>& held,
                    const Progress& progress, const Vector& bound = {});
 
-  /// Moves x (k,3) towards the solution for the right-hand side (k,3) of the edges, until the residual is
-  /// `tolerance` of that at the start; `places` (k,3) are those that nodes are bound to.
-  /// `still` (k): 1 for nodes that stay this time, the held ones among them; empty: these alone.
-  void solve(const Points& right, const Points& places, double tolerance, Points& x,
-             const std::vector<char>& still = {});
+  /// Moves x (k,3) towards the solution, until the residual is `tolerance` of that at the start: (k,3) of the
+  /// edges at x, and of the pull to `places` (k,3), those that nodes are bound to.
+  void solve(const Points& residual, const Points& places, double tolerance, Points& x);
+
+  /// Goes on after some nodes have been moved from `solution`, the last x, to where x is now; `still` (k): 1
+  /// for nodes that stay from now on, the held ones among them.
+  void solve_further(const Points& solution, const std::vector<char>& still, double tolerance, Points& x);
 
  private:
   /// Groups of the nodes of the level before.
@@ -39,6 +41,7 @@ class SurfaceLaplacian {
   /// Both return the sum of the products of their two entries.
   double multiply(const Points& x, Points& product) const;
   double precondition(const Points& residual, Points& step);
+  void reduce_residual(double tolerance, Points& x);
 
   const WeldedSurface& surface_;
   std::vector<double> weight_;  // of the surface's edges

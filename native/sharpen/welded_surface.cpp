@@ -107,12 +107,11 @@ Points WeldedSurface::at_nodes(PointsIn moved) const {
   return result;
 }
 
-Points WeldedSurface::normals(const Points& positions) const {
-  Points result(triangles(), 3);
+void WeldedSurface::normals(const Points& positions, Points& result) const {
+  result.resize(triangles(), 3);
   parallel_for(0, triangles(), surface_grain, [&](Index begin, Index end) {
     for (Index t = begin; t < end; ++t) result.row(t) = normal(t, positions);
   });
-  return result;
 }
 
 std::vector<double> WeldedSurface::edge_weights(const Vector& factors) const {
@@ -133,11 +132,10 @@ std::vector<double> WeldedSurface::edge_weights(const Vector& factors) const {
 
 Mat3 WeldedSurface::spread(Index node, const Points& positions) const {
   Mat3 result = Mat3::Zero();
-  for (std::int32_t at = first_neighbour_[node]; at < first_neighbour_[node + 1]; ++at) {
-    const Index j = neighbours_[at];
-    const Vec3 rest = edge_weights_[at] * (rest_.row(j) - rest_.row(node));
+  edges(node, [&](Index j, double weight) {
+    const Vec3 rest = weight * (rest_.row(j) - rest_.row(node));
     result += (positions.row(j) - positions.row(node)).transpose() * rest.transpose();
-  }
+  });
   return result;
 }
 

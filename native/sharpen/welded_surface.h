@@ -36,7 +36,7 @@ class WeldedSurface {
     return (corner(1) - corner(0)).cross(corner(2) - corner(0));
   }
   /// (m',3) of all triangles.
-  Points normals(const Points& positions) const;
+  void normals(const Points& positions, Points& result) const;
 
   /// Corners of triangles at a node: each 3·t + k.
   template <class Visit>
@@ -48,10 +48,14 @@ class WeldedSurface {
   /// first_neighbour()[i] on.
   const std::vector<std::int32_t>& first_neighbour() const { return first_neighbour_; }
   const std::vector<std::int32_t>& neighbours() const { return neighbours_; }
+  /// Those of one node: each neighbour j, and the edge's weight.
+  template <class Visit>
+  void edges(Index node, Visit&& visit) const {
+    for (std::int32_t at = first_neighbour_[node]; at < first_neighbour_[node + 1]; ++at)
+      visit(static_cast<Index>(neighbours_[at]), edge_weights_[at]);
+  }
   /// Of the edge to each of neighbours(): Σ of the weights in its triangles, times their factors (m').
   std::vector<double> edge_weights(const Vector& factors) const;
-  /// The same with factors of 1.
-  const std::vector<double>& edge_weights() const { return edge_weights_; }
 
   /// The rotation of a node, for these positions (k,3), that fits its edges best.
   Mat3 rotation(Index node, const Points& positions) const;

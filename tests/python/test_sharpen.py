@@ -11,6 +11,7 @@ import arapfields as af
 CUBE = np.concatenate([np.eye(3), -np.eye(3)])
 ALIKE = 1e-6  # of a size of about 1: what the conjugate gradients leave
 NONE_ROUNDED = 1e-12
+SYMMETRIC = 1e-2  # of a size of about 1: steps end at a residual, and folds are opened one by one
 PLACED = 1e-5  # of a size of about 1: distances are in single precision
 
 
@@ -113,6 +114,34 @@ def test_single_folds_of_before_are_opened(name):
     assert len(af.folded_triangles(vertices, triangles, moved)) > 0
     opened = af.sharpen(vertices, triangles, moved, "cube")
     assert len(af.folded_triangles(vertices, triangles, opened)) == 0
+
+
+@pytest.mark.parametrize("shrink", [0.0, 1e-3, 1e-2])
+def test_a_patch_that_is_hard_to_open_leaves_the_finish_elsewhere(shrink):
+    """What a field has pressed to nearly a point has no shape there that could be given back."""
+    vertices, triangles = sphere(1.0, 5)
+    cap, middle = vertices[:, 2] > 0.97, np.array([0.0, 0.0, 0.97])
+    moved = vertices.copy()
+    moved[cap] = middle + shrink * (vertices[cap] - middle)
+    moved[cap] += np.random.default_rng(0).normal(scale=1e-5, size=(cap.sum(), 3))
+    before = af.folded_triangles(vertices, triangles, moved)
+    sharpened = af.sharpen(vertices, triangles, moved, "cube")
+    assert set(af.folded_triangles(vertices, triangles, sharpened)) <= set(before)
+    assert angle_to_style(sharpened, triangles) < 0.2 * angle_to_style(moved, triangles)
+
+
+@pytest.mark.parametrize("style", ["cube", "octahedron"])
+def test_a_mesh_with_mirrored_triangles_stays_symmetric(style):
+    """Rough, and alike on both sides of x = 0; the style is, too."""
+    vertices, triangles = sphere(1.0, 3)
+    mirror = np.array([-1.0, 1.0, 1.0])
+    partner = np.linalg.norm(vertices[:, None] - vertices * mirror, axis=2).argmin(axis=0)
+    radii = 1 + np.random.default_rng(6).normal(scale=0.01, size=len(vertices))
+    vertices = vertices * [1.0, 0.6, 0.8] * (0.5 * (radii + radii[partner]))[:, None]
+    assert np.abs(vertices[partner] - vertices * mirror).max() < NONE_ROUNDED
+    sharpened = af.sharpen(vertices, triangles, vertices, style)
+    assert np.abs(sharpened - vertices).max() > 0.02
+    assert np.abs(sharpened[partner] - sharpened * mirror).max() < SYMMETRIC
 
 
 def test_a_triangle_that_has_turned_over_is_folded_and_a_turned_mesh_is_not():
