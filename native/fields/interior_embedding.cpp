@@ -13,8 +13,8 @@
 #include "core/parallel.h"
 #include "fields/interior_embedding_kernel.h"
 #include "fields/radial_basis.h"
-#include "mesh/is_closed.h"
 #include "mesh/outward_triangles.h"
+#include "mesh/pieces.h"
 #include "sampling/nearest_sample.h"
 
 namespace arapfields {
@@ -464,20 +464,30 @@ std::vector<Index> unseen_samples(PointsIn samples, PointsIn normals, const std:
 
 }  // namespace
 
+std::vector<Index> InteriorEmbedding::near_walls(const std::vector<SurfaceSide>& nearest) const {
+  std::vector<Index> result;
+  for (std::size_t p = 0; p < nearest.size(); ++p)
+    if (sight->is_doubtful(nearest[p])) result.push_back(static_cast<Index>(p));
+  return result;
+}
+
+void InteriorEmbedding::look(const std::vector<Index>& rows, PointsIn points, PointsIn normals,
+                             const InsideSight& mesh, std::vector<SurfaceSide>& sides) const {
+  std::vector<SurfaceSide> nearest;
+  for (const Index p : rows) nearest.push_back(sides[p]);
+  const SeenNodes seen = nearest_seen(points(rows, Eigen::all), normals(rows, Eigen::all), nodes,
+                                      sight->normals, nearest, width, mesh);
+  for (std::size_t k = 0; k < rows.size(); ++k) sides[rows[k]] = static_cast<SurfaceSide>(seen.nodes[k]);
+}
+
 std::vector<SurfaceSide> InteriorEmbedding::sides_of(PointsIn points, PointsIn normals,
                                                      const InsideSight& mesh,
                                                      std::vector<Index>* doubtful) const {
   if (!sight) return std::vector<SurfaceSide>(static_cast<std::size_t>(points.rows()), -1);
   std::vector<SurfaceSide> result = sight->nearest_nodes(points);
-  std::vector<Index> some;
-  std::vector<SurfaceSide> nearest;
-  for (Index p = 0; p < points.rows(); ++p)
-    if (sight->is_doubtful(result[p])) some.push_back(p), nearest.push_back(result[p]);
-  if (doubtful != nullptr) *doubtful = some;
-  if (some.empty()) return result;
-  const SeenNodes seen = nearest_seen(points(some, Eigen::all), normals(some, Eigen::all), nodes,
-                                      sight->normals, nearest, width, mesh);
-  for (std::size_t k = 0; k < some.size(); ++k) result[some[k]] = static_cast<SurfaceSide>(seen.nodes[k]);
+  const std::vector<Index> near = near_walls(result);
+  if (doubtful != nullptr) *doubtful = near;
+  if (!near.empty()) look(near, points, normals, mesh, result);
   return result;
 }
 
@@ -493,15 +503,25 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& outward
                                                      const InsideSight& mesh,
                                                      std::vector<Index>* doubtful) const {
   const Points places = frame.to_cube(outward.vertices);
-  std::vector<Index> near;
-  std::vector<SurfaceSide> result = sides_of(places, vertex_normals(outward), mesh, &near);
+  std::vector<SurfaceSide> result = sight->nearest_nodes(places);
+  const std::vector<Index> near = near_walls(result);
   if (doubtful != nullptr) *doubtful = near;
+  if (near.empty()) return result;
+  // Vertices in one place that triangles join, as along a seam, are looked at as one.
+  const std::vector<std::int32_t> joined = joined_vertices(outward);
+  TriangleMesh seamless = outward;
+  for (std::int32_t& corner : seamless.triangles.reshaped()) corner = joined[corner];
+  std::vector<Index> looked;
   std::vector<bool> is_near(result.size(), false);
-  for (const Index v : near) is_near[static_cast<std::size_t>(v)] = true;
-  std::vector<std::vector<std::int32_t>> beside(near.empty() ? 0 : result.size());
-  for (Index t = 0; !near.empty() && t < outward.triangles.rows(); ++t)
+  for (const Index v : near) {
+    is_near[static_cast<std::size_t>(v)] = true;
+    if (joined[v] == v) looked.push_back(v);
+  }
+  look(looked, places, vertex_normals(seamless), mesh, result);
+  std::vector<std::vector<std::int32_t>> beside(result.size());
+  for (Index t = 0; t < seamless.triangles.rows(); ++t)
     for (int k = 0; k < 3; ++k) {
-      const std::int32_t a = outward.triangles(t, k), b = outward.triangles(t, (k + 1) % 3);
+      const std::int32_t a = seamless.triangles(t, k), b = seamless.triangles(t, (k + 1) % 3);
       if (!is_near[a] || !is_near[b] || (places.row(a) - places.row(b)).squaredNorm() > width * width)
         continue;
       beside[a].push_back(b);
@@ -517,7 +537,7 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& outward
   bool changed = true;
   for (int round = 0; changed && round < most_rounds; ++round) {
     changed = false;
-    for (const Index v : near) {
+    for (const Index v : looked) {
       auto least = torn(v, result[v]);
       for (const std::int32_t other : beside[v]) {
         if (least == 0) break;
@@ -530,19 +550,7 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& outward
       }
     }
   }
-  // Vertices in one place, as along a seam, lie on one side if theirs see each other.
-  if (near.empty()) return result;
-  const std::vector<std::int32_t> first = first_at_position(outward.vertices);
-  std::vector<std::vector<SurfaceSide>> sides_at(result.size());
-  for (const Index v : near) {
-    std::vector<SurfaceSide>& known = sides_at[static_cast<std::size_t>(first[v])];
-    const auto seen = std::find_if(known.begin(), known.end(),
-                                   [&](SurfaceSide side) { return !sight->hides(side, result[v]); });
-    if (seen != known.end())
-      result[v] = *seen;
-    else
-      known.push_back(result[v]);
-  }
+  for (const Index v : near) result[v] = result[joined[v]];
   return result;
 }
 

@@ -87,11 +87,19 @@ struct ARAPFIELDS_EXPORT InteriorEmbedding {
   std::vector<SurfaceSide> sides_of(PointsIn points, PointsIn normals, const InsideSight& mesh,
                                     std::vector<Index>* doubtful = nullptr) const;
   /// The same of a mesh's vertices, in mesh coordinates; `frame` is that of the nodes' cube. The ends of a
-  /// short edge lie on sides that see each other, so that no such edge is torn, nor a seam of vertices.
+  /// short edge lie on sides that see each other, so that no such edge is torn, and vertices in one place on
+  /// one side if triangles join them, so that no seam is.
   std::vector<SurfaceSide> sides_of(const TriangleMesh& mesh, const Frame& frame) const;
   /// The same for a mesh whose triangles face outwards.
   std::vector<SurfaceSide> sides_of(const TriangleMesh& outward, const Frame& frame, const InsideSight& sight,
                                     std::vector<Index>* doubtful = nullptr) const;
+
+ private:
+  /// The rows of points whose nearest node is doubtful.
+  std::vector<Index> near_walls(const std::vector<SurfaceSide>& nearest) const;
+  /// Replaces these rows' sides, their nearest nodes, by the nearest ones that they see.
+  void look(const std::vector<Index>& rows, PointsIn points, PointsIn normals, const InsideSight& mesh,
+            std::vector<SurfaceSide>& sides) const;
 };
 
 /// Makes the sight of the surface when it is needed; null where the surface is not known.

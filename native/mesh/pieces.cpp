@@ -2,6 +2,7 @@
 #include "mesh/pieces.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -23,7 +24,11 @@ class UnionFind {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;
   }
-  void join(std::int32_t a, std::int32_t b) { parent_[find(a)] = find(b); }
+  /// The smaller of the two sets' firsts stands for both.
+  void join(std::int32_t a, std::int32_t b) {
+    a = find(a), b = find(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
 
  private:
   std::vector<std::int32_t> parent_;
@@ -48,19 +53,16 @@ std::vector<double> angles_around(const TriangleMesh& mesh, std::int32_t low, Pa
   return angles;
 }
 
-}  // namespace
-
-std::vector<std::int32_t> pieces_of(const TriangleMesh& mesh) {
-  const Index count = mesh.triangles.rows();
-  UnionFind joined(count);
-  std::vector<bool> open(static_cast<std::size_t>(count));  // at a boundary
-  const EdgePassages passages(mesh.vertices, mesh.triangles);
+/// visit(low, p, q) for each two passages along an edge from the vertex `low` whose triangles are joined
+/// there, and open(p) for each at a boundary.
+template <class Visit, class Open>
+void each_join(const TriangleMesh& mesh, const EdgePassages& passages, const Visit& visit, const Open& open) {
   passages.each_edge([&](std::int32_t low, auto from, auto to) {
     const auto upwards = std::count_if(from, to, [](const EdgePassage& p) { return p.upwards; });
     if (to - from == 2 || 2 * upwards != to - from) {
       for (auto p = from; p != to; ++p) {
-        joined.join(from->triangle, p->triangle);
-        if (to - from != 2) open[static_cast<std::size_t>(p->triangle)] = true;
+        if (p != from) visit(low, *from, *p);
+        if (to - from != 2) open(*p);
       }
       return;
     }
@@ -76,9 +78,42 @@ std::vector<std::int32_t> pieces_of(const TriangleMesh& mesh) {
         while (turn < same_angle) turn += 2.0 * std::numbers::pi;
         if (turn < least) least = turn, next = q;
       }
-      joined.join(p->triangle, next->triangle);
+      visit(low, *p, *next);
     }
   });
+}
+
+}  // namespace
+
+std::vector<std::int32_t> joined_vertices(const TriangleMesh& mesh) {
+  const EdgePassages passages(mesh.vertices, mesh.triangles);
+  const auto corner_at = [&](std::int32_t triangle, std::int32_t place) {
+    int k = 0;
+    while (passages.first()[mesh.triangles(triangle, k)] != place) ++k;
+    return mesh.triangles(triangle, k);
+  };
+  UnionFind joined(mesh.vertices.rows());
+  each_join(
+      mesh, passages,
+      [&](std::int32_t low, const EdgePassage& p, const EdgePassage& q) {
+        for (const std::int32_t place : {low, p.high})
+          joined.join(corner_at(p.triangle, place), corner_at(q.triangle, place));
+      },
+      [](const EdgePassage&) {});
+  std::vector<std::int32_t> result(static_cast<std::size_t>(mesh.vertices.rows()));
+  for (std::int32_t v = 0; v < mesh.vertices.rows(); ++v) result[v] = joined.find(v);
+  return result;
+}
+
+std::vector<std::int32_t> pieces_of(const TriangleMesh& mesh) {
+  const Index count = mesh.triangles.rows();
+  UnionFind joined(count);
+  std::vector<bool> open(static_cast<std::size_t>(count));  // at a boundary
+  const EdgePassages passages(mesh.vertices, mesh.triangles);
+  each_join(
+      mesh, passages,
+      [&](std::int32_t, const EdgePassage& p, const EdgePassage& q) { joined.join(p.triangle, q.triangle); },
+      [&](const EdgePassage& p) { open[static_cast<std::size_t>(p.triangle)] = true; });
   std::vector<bool> is_open(static_cast<std::size_t>(count));
   for (std::int32_t t = 0; t < count; ++t)
     if (open[static_cast<std::size_t>(t)]) is_open[static_cast<std::size_t>(joined.find(t))] = true;

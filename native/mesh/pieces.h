@@ -13,4 +13,8 @@ namespace arapfields {
 /// that share a position of a vertex are one.
 ARAPFIELDS_EXPORT_TO_TESTS std::vector<std::int32_t> pieces_of(const TriangleMesh& mesh);
 
+/// For each vertex (n) the first of those in its place that triangles around it join with it, across edges as
+/// above: along a seam they are one, on two sides of a closed slit they are not.
+ARAPFIELDS_EXPORT_TO_TESTS std::vector<std::int32_t> joined_vertices(const TriangleMesh& mesh);
+
 }  // namespace arapfields

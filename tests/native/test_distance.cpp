@@ -221,6 +221,17 @@ BOOST_AUTO_TEST_CASE(solids_that_touch_are_pieces_of_their_own) {
   }
 }
 
+BOOST_AUTO_TEST_CASE(vertices_are_joined_along_seams_and_not_across_walls_that_touch) {
+  for (const Vec3& step : {Vec3(1, 0, 0), Vec3(1, 1, 0), Vec3(1, 1, 1)}) {
+    const std::vector<std::int32_t> joined = joined_vertices(two_boxes(step));  // three to six at each corner
+    for (const int begin : {0, 36}) {
+      const std::set<std::int32_t> corners(joined.begin() + begin, joined.begin() + begin + 36);
+      BOOST_TEST(corners.size() == 8);
+      BOOST_TEST((*corners.begin() >= begin && *corners.rbegin() < begin + 36));
+    }
+  }
+}
+
 BOOST_AUTO_TEST_CASE(walls_of_a_slit_are_of_one_piece) {
   // Without one triangle of the wall between the boxes, on both sides, what is left of it is a slit.
   TriangleMesh mesh = two_boxes(Vec3(1, 0, 0));

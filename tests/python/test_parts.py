@@ -206,6 +206,7 @@ def test_many_small_parts_take_only_a_share_of_the_samples():
 # Parts of a shape that touch at rest, or nearly, come apart: there the field lives on the surface.
 
 GAPS = [0.2, 0.02, 0.004, 0.0]
+ROUNDED = 1e-9  # of normals summed in another order
 # A jaw of size 1 turned by 25° about its hinge; a field of finite resolution rounds the slit's end.
 JAW_ERROR = 0.042  # seen .0402 where the slit is open
 
@@ -355,6 +356,16 @@ def test_visibility_of_nodes_is_checked_on_loading(name, value, message, tmp_pat
     (tmp_path / "field.safetensors").write_bytes(content)
     with pytest.raises(af.InvalidInput, match=message):
         af.DeformationField.load(tmp_path / "field.safetensors")
+
+
+@pytest.mark.parametrize("gap", GAPS)
+def test_triangles_with_vertices_of_their_own_move_as_those_that_share_them(gap):
+    vertices, triangles, _, field = solved(gap)
+    together = field.apply(vertices, triangles=triangles)
+    apart = field.apply(
+        vertices[triangles].reshape(-1, 3), triangles=np.arange(triangles.size).reshape(-1, 3)
+    )
+    assert np.abs(apart.reshape(-1, 3, 3) - together[triangles]).max() < ROUNDED
 
 
 def test_a_finer_mesh_is_moved_by_its_own_triangles():
