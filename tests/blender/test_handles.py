@@ -477,7 +477,8 @@ def test_applied_transforms_keep_shape_and_handles(what, is_live):
         shape = scenes.world_points(bar)
         now = np.array(bar.arapfields.handles[0].empty.matrix_world)
         off = [np.abs(a - b).max() for a, b in ((shape, before), (now, place), (rest_of(bar), rest))]
-        assert max(off) < 1e-5, off
+        anew = is_live and what == "origin"  # a live shape is solved anew where the origin alone moves
+        assert off[0] < (1e-3 if anew else 1e-5) and max(off[1:]) < 1e-5, off
 
     APPLIED[what]()
     is_as_before()
