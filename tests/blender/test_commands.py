@@ -28,7 +28,8 @@ if IN_BLENDER:
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = ["--iterations", "20", "--samples", "1000", "--batch", "100", "--width", "16", "--layers", "1"]
-ENDLESS = [*QUICK, "--field", "neural", "--iterations", "100000"]
+# A network without a finish: with one, the field takes few steps and the mesh ends the solve.
+ENDLESS = [*QUICK, "--field", "neural", "--no-finish", "--iterations", "1000000"]
 HOLD_AND_LIFT = {
     "handles": [
         {"type": "cuboid", "corners": [[None, None, None], [-0.5, None, None]]},
