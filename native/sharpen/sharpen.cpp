@@ -3,16 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_set>
 
 #include "core/errors.h"
 #include "core/memory.h"
 #include "core/parallel.h"
 #include "core/types.h"
 #include "energies/gauss.h"
-#include "energies/rotation.h"
 #include "mesh/outward_triangles.h"
 #include "sharpen/contact_limits.h"
+#include "sharpen/fold_repair.h"
 #include "sharpen/folded_triangles.h"
 #include "sharpen/surface_laplacian.h"
 
@@ -37,11 +36,6 @@ constexpr double detail_reach = 0.02, on_detail = 0.85, off_detail = 0.96, detai
 constexpr double momentum = 0.8;
 /// Residual of a global step's system, relative to that at its start.
 constexpr double solve_tolerance = 0.05;
-/// Rounds in which folded triangles are opened, and in which what lies around them gets its shape back, in
-/// sweeps: after some rounds they are opened again, and a ring more follows. And rings in which what is still
-/// folded gets its shape at rest, at first and at most: twice as many each time.
-constexpr int most_openings = 8, most_relaxations = 16, rounds_a_ring = 4, relaxing_sweeps = 8;
-constexpr int first_rings_at_rest = 4, most_rings_at_rest = 64;
 /// Bytes that a vertex takes with its two triangles, at most.
 constexpr double bytes_per_vertex = 2000.0;
 constexpr Index sharpen_grain = 4096;
@@ -210,189 +204,15 @@ class Finish {
     limits_.keep(positions_);
   }
 
-  /// Opens triangles that are folded, one vertex of each at a time; where that does not help, gives what lies
-  /// around them its former shape, in more and more rings by turns with the former. What then is folded
-  /// gets its shape at rest, in wider and wider rings by turns with openings. If that leaves what was not
-  /// folded at the start, all goes back there.
+  /// Opens triangles that are folded. Where that leaves some that are not folded at the start, all goes back
+  /// there.
   void spare_folds() {
-    surface_.rotations(positions_, rotations_);
-    std::vector<std::int32_t> found = folded();
-    int rings = first_rings_at_rest;
-    for (int round = 0; !found.empty(); ++round) {
-      progress_.check();
-      std::vector<std::int32_t> moved;
-      const bool relaxes = round < most_openings + most_relaxations;
-      if (round < most_openings || (round % rounds_a_ring == 0) == relaxes) {
-        for (const std::int32_t t : found)
-          if (const std::int32_t node = open(t); node >= 0) moved.push_back(node);
-      } else if (relaxes) {
-        for (const std::int32_t t : found) {
-          const std::vector<std::int32_t> nodes =
-              nodes_around(t, 1 + (round - most_openings) / rounds_a_ring);
-          relax(nodes, shape_of(t));
-          moved.insert(moved.end(), nodes.begin(), nodes.end());
-        }
-      } else {
-        if (rings > most_rings_at_rest) {
-          const auto before = [&](std::int32_t t) { return is_folded(surface_, t, start_); };
-          if (!std::all_of(found.begin(), found.end(), before)) positions_ = start_;
-          return;
-        }
-        for (const std::int32_t t : found) {
-          const std::vector<std::int32_t> nodes = set_back(t, rings);
-          moved.insert(moved.end(), nodes.begin(), nodes.end());
-        }
-        rings *= 2;
-      }
-      if (limits_.any()) {
-        const std::vector<char> kept = limits_.keep(positions_);
-        for (Index i = 0; i < surface_.nodes(); ++i)
-          if (kept[i]) moved.push_back(static_cast<std::int32_t>(i));
-      }
-      found = folded(moved, found);
-    }
+    if (!FoldRepair(surface_, start_, held_, limits_, progress_).open_folds(positions_)) positions_ = start_;
   }
 
   const Points& positions() const { return positions_; }
 
  private:
-  /// The shape that a triangle gets back: that at the start, or where it is folded there, at rest.
-  const Points& shape_of(Index triangle) const {
-    return is_folded(surface_, triangle, start_) ? surface_.rest() : start_;
-  }
-
-  std::vector<std::int32_t> folded() const {
-    const std::vector<char> now = all_folded(surface_, positions_, rotations_);
-    std::vector<std::int32_t> result;
-    for (Index t = 0; t < surface_.triangles(); ++t)
-      if (now[t]) result.push_back(static_cast<std::int32_t>(t));
-    return result;
-  }
-
-  /// The same after these nodes have moved since it was `found`.
-  std::vector<std::int32_t> folded(const std::vector<std::int32_t>& moved,
-                                   const std::vector<std::int32_t>& found) {
-    const auto sorted = [](std::vector<std::int32_t> list) {
-      std::sort(list.begin(), list.end());
-      list.erase(std::unique(list.begin(), list.end()), list.end());
-      return list;
-    };
-    std::vector<std::int32_t> turned = moved, near = found, result;
-    for (const std::int32_t i : sorted(moved))
-      turned.insert(turned.end(), surface_.neighbours().begin() + surface_.first_neighbour()[i],
-                    surface_.neighbours().begin() + surface_.first_neighbour()[i + 1]);
-    for (const std::int32_t i : sorted(std::move(turned))) {
-      rotations_[i] = surface_.rotation(i, positions_);
-      surface_.around(i, [&](Index t, int) { near.push_back(static_cast<std::int32_t>(t)); });
-    }
-    for (const std::int32_t t : sorted(std::move(near)))
-      if (is_folded(surface_, t, positions_, rotations_)) result.push_back(t);
-    return result;
-  }
-
-  /// Nodes within that many rings of a triangle, from the inner ones on; `first_of_ring`: of the second one
-  /// on, where each begins.
-  std::vector<std::int32_t> nodes_around(Index triangle, int rings,
-                                         std::vector<std::size_t>* first_of_ring = nullptr) const {
-    std::vector<std::int32_t> result;
-    std::unordered_set<std::int32_t> reached;
-    const auto reach = [&](Index t) {
-      for (int k = 0; k < 3; ++k)
-        if (const std::int32_t node = surface_.corners()(t, k); reached.insert(node).second)
-          result.push_back(node);
-    };
-    reach(triangle);
-    std::size_t from = 0;
-    for (int ring = 1; ring < rings && from < result.size(); ++ring) {
-      const std::size_t end = result.size();
-      if (first_of_ring) first_of_ring->push_back(end);
-      for (; from < end; ++from) surface_.around(result[from], [&](Index t, int) { reach(t); });
-    }
-    return result;
-  }
-
-  /// The rotation that fits the edges of nodes best, from this shape on.
-  Mat3 turn_of(const std::vector<std::int32_t>& nodes, const Points& shape) const {
-    Mat3 spread = Mat3::Zero();
-    for (const std::int32_t node : nodes)
-      surface_.edges(node, [&](Index j, double weight) {
-        spread += weight * (positions_.row(j) - positions_.row(node)).transpose() *
-                  (shape.row(j) - shape.row(node));
-      });
-    return closest_rotation(spread);
-  }
-
-  /// Gives a triangle its shape at rest, moved as a whole, and what is around it the less of it the
-  /// farther it is, in this many rings. Returns the nodes.
-  std::vector<std::int32_t> set_back(Index triangle, int rings) {
-    std::vector<std::size_t> first_of_ring;
-    const std::vector<std::int32_t> nodes = nodes_around(triangle, rings, &first_of_ring);
-    const Mat3 turn = turn_of(nodes, surface_.rest());
-    Vec3 before = Vec3::Zero(), now = Vec3::Zero();
-    for (const std::int32_t node : nodes) {
-      before += surface_.rest().row(node) / static_cast<double>(nodes.size());
-      now += positions_.row(node) / static_cast<double>(nodes.size());
-    }
-    std::size_t ring = 0;
-    for (std::size_t at = 0; at < nodes.size(); ++at) {
-      while (ring < first_of_ring.size() && at >= first_of_ring[ring]) ++ring;
-      if (held_[nodes[at]]) continue;
-      const Vec3 place = now + turn * (surface_.rest().row(nodes[at]).transpose() - before);
-      positions_.row(nodes[at]) +=
-          (1.0 - static_cast<double>(ring) / rings) * (place.transpose() - positions_.row(nodes[at]));
-    }
-    return nodes;
-  }
-
-  /// Gives nodes, turned as one, this shape, as far as what is around them lets.
-  void relax(const std::vector<std::int32_t>& nodes, const Points& shape) {
-    const Mat3 turn = turn_of(nodes, shape);
-    for (int sweep = 0; sweep < relaxing_sweeps; ++sweep)
-      for (const std::int32_t node : nodes) {
-        if (held_[node]) continue;
-        Vec3 sum = Vec3::Zero();
-        double weights = 0.0;
-        surface_.edges(node, [&](Index j, double weight) {
-          const Vec3 edge = shape.row(node) - shape.row(j), place = positions_.row(j);
-          sum += weight * (place + turn * edge);
-          weights += weight;
-        });
-        positions_.row(node) = sum / weights;
-      }
-  }
-
-  /// Gives a triangle the height over its longest edge that it has in its former shape: of a thin triangle
-  /// the vertex there hardly moves. Returns its node; −1 where none moves.
-  std::int32_t open(Index t) {
-    const Points& shape = shape_of(t);
-    int apex = 0;
-    double longest = -1.0;
-    const auto corner = [&](int k) { return surface_.corners()(t, k % 3); };
-    for (int k = 0; k < 3; ++k) {
-      const double length = (shape.row(corner(k + 1)) - shape.row(corner(k + 2))).squaredNorm();
-      if (length > longest && !held_[corner(k)]) {
-        longest = length;
-        apex = k;
-      }
-    }
-    if (!(longest > 0.0)) return -1;
-    const auto from = corner(apex + 1), to = corner(apex + 2);
-    const Vec3 base = shape.row(to) - shape.row(from), side = shape.row(corner(apex)) - shape.row(from);
-    const double along = side.dot(base) / longest;
-    const Vec3 height = side - along * base, edge = positions_.row(to) - positions_.row(from);
-    // The height lies across the edge in the plane that the triangle should have.
-    Mat3 turn = Mat3::Zero();
-    for (int k = 0; k < 3; ++k) turn += rotations_[corner(k)];
-    const Vec3 rest[3] = {surface_.rest().row(from), surface_.rest().row(to),
-                          surface_.rest().row(corner(apex))};
-    const Vec3 normal = turn * (rest[1] - rest[0]).cross(rest[2] - rest[0]);
-    const Vec3 across = normal.cross(edge);
-    if (!(across.norm() > 0.0)) return -1;
-    positions_.row(corner(apex)) =
-        positions_.row(from) + (along * edge + height.norm() / across.norm() * across).transpose();
-    return corner(apex);
-  }
-
   /// Of the global step at these positions: Σ of each node's edges of w ((R_i + R_j) e − 2 d), d the edge
   /// now, and of its triangles' of −λ w (d·p) p, p the direction that pulls.
   void set_residual() {
