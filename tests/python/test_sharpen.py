@@ -130,6 +130,45 @@ def test_a_patch_that_is_hard_to_open_leaves_the_finish_elsewhere(shrink):
     assert angle_to_style(sharpened, triangles) < 0.2 * angle_to_style(moved, triangles)
 
 
+def truncated(vertices, triangles, corners, shares, random):
+    """Each of these vertices cut off at a share of its edges: tiny triangles, as marching cubes leave them
+    where a surface passes a corner of their grid."""
+    vertices, triangles = list(vertices), [list(t) for t in triangles]
+    for corner, share in zip(corners, shares, strict=True):
+        around = [t for t in triangles if corner in t]
+        after = {t[(t.index(corner) + 1) % 3]: t[(t.index(corner) + 2) % 3] for t in around}
+        ring = [next(iter(after))]
+        while after[ring[-1]] != ring[0]:
+            ring.append(after[ring[-1]])
+        cuts = np.arange(len(ring)) + len(vertices)
+        edges = np.array([vertices[i] - vertices[corner] for i in ring])
+        noise = random.normal(scale=0.1 * np.linalg.norm(edges, axis=1).mean(), size=edges.shape)
+        vertices += list(vertices[corner] + share * (edges + noise))
+        triangles = [t for t in triangles if corner not in t]
+        for k in range(len(ring)):
+            last = (k + 1) % len(ring)
+            triangles += [[cuts[k], ring[k], ring[last]], [cuts[k], ring[last], cuts[last]]]
+            if 0 < k < len(ring) - 1:
+                triangles.append([cuts[0], cuts[k], cuts[last]])
+    return np.array(vertices), np.array(triangles)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_tiny_triangles_stay_open_and_the_finish_is_kept(seed):
+    random = np.random.default_rng(seed)
+    vertices, triangles = sphere(1.0, 4)
+    far_apart = np.flatnonzero(random.permutation(len(vertices)) < 400)
+    taken = []
+    for corner in far_apart:
+        if all(np.linalg.norm(vertices[corner] - vertices[other]) > 0.2 for other in taken):
+            taken.append(corner)
+    tiny = truncated(vertices, triangles, taken, 10.0 ** -random.uniform(2, 6, len(taken)), random)
+    sharpened, without = (af.sharpen(v, t, v, "cube") for v, t in (tiny, (vertices, triangles)))
+    assert len(af.folded_triangles(*tiny, sharpened)) == 0
+    gain = angle_to_style(vertices, triangles) - angle_to_style(without, triangles)
+    assert angle_to_style(*tiny) - angle_to_style(sharpened, tiny[1]) > 0.9 * gain
+
+
 @pytest.mark.parametrize("style", ["cube", "octahedron"])
 def test_a_mesh_with_mirrored_triangles_stays_symmetric(style):
     """Rough, and alike on both sides of x = 0; the style is, too."""
