@@ -15,11 +15,12 @@ namespace {
 /// between them.
 constexpr std::size_t most_close = 32;
 constexpr double apart = 3.0;
-/// Passes in which what lies around folded triangles gets its shape back, a ring more in each; rounds of
-/// opening and of that in each; and sweeps of each of these.
-constexpr int most_rings = 4, openings = 4, relaxations = 2, relaxing_sweeps = 8;
-/// Rings around what is then still folded that get their shape at rest, twice as many each time, at most.
-constexpr int most_rings_at_rest = 64;
+/// Passes in which what lies around folded triangles is relaxed, a ring more in each; rounds of opening and
+/// of that in each; and sweeps of each of these.
+constexpr int most_rings = 2, openings = 4, relaxations = 2, relaxing_sweeps = 8;
+/// Rings around what is then still folded that go back to their former shape, twice as many each time, at
+/// most.
+constexpr int most_rings_back = 128;
 
 Eigen::RowVector3d mean_of(const std::vector<std::int32_t>& nodes, const Points& shape) {
   Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
@@ -54,7 +55,7 @@ bool FoldRepair::open_folds(Points& positions) {
     open_singly();
     for (int i = 0; i < relaxations; ++i) round([&](Index t) { return relax(t, rings); });
   }
-  for (int rings = most_rings; rings <= most_rings_at_rest; rings *= 2) {
+  for (int rings = most_rings; rings <= most_rings_back; rings *= 2) {
     round([&](Index t) { return set_back(t, rings); });
     open_singly();
   }
@@ -235,20 +236,29 @@ FoldRepair::Nodes FoldRepair::relax(Index triangle, int rings) {
   return nodes;
 }
 
-/// Gives a triangle its shape at rest, moved as a whole, and what is around it the less of it the farther it
-/// is, in so many rings.
+/// Gives what is around a triangle its former shape, moved as a whole, and the less of it the farther it is,
+/// within so many rings: by distances, which tell tiny triangles from large ones.
 FoldRepair::Nodes FoldRepair::set_back(Index triangle, int rings) {
   std::vector<std::size_t> first_of_ring;
-  Nodes nodes = nodes_around(triangle, rings, &first_of_ring);
-  const Mat3 turn = turn_of(nodes, surface_.rest());
-  const Eigen::RowVector3d before = mean_of(nodes, surface_.rest()), now = mean_of(nodes, positions_);
-  std::size_t ring = 0;
-  for (std::size_t at = 0; at < nodes.size(); ++at) {
-    while (ring < first_of_ring.size() && at >= first_of_ring[ring]) ++ring;
-    const std::int32_t i = nodes[at];
+  Nodes nodes = nodes_around(triangle, rings + 1, &first_of_ring);
+  Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
+  for (int k = 0; k < 3; ++k) middle += surface_.rest().row(surface_.corners()(triangle, k)) / 3.0;
+  const auto distance = [&](std::int32_t i) { return (surface_.rest().row(i) - middle).norm(); };
+  double radius = INFINITY;  // to the last ring; where a piece ends before it, all goes back
+  if (static_cast<int>(first_of_ring.size()) == rings)
+    for (std::size_t at = first_of_ring.back(); at < nodes.size(); ++at)
+      radius = std::min(radius, distance(nodes[at]));
+  const auto beyond = [&](std::int32_t i) { return distance(i) >= radius; };
+  nodes.erase(std::remove_if(nodes.begin(), nodes.end(), beyond), nodes.end());
+  if (nodes.empty()) return {};
+  const Points& shape = shape_of(triangle);
+  const Mat3 turn = turn_of(nodes, shape);
+  const Eigen::RowVector3d before = mean_of(nodes, shape), now = mean_of(nodes, positions_);
+  for (const std::int32_t i : nodes) {
     if (held_[i]) continue;
-    const Eigen::RowVector3d place = now + (surface_.rest().row(i) - before) * turn.transpose();
-    positions_.row(i) += (1.0 - static_cast<double>(ring) / rings) * (place - positions_.row(i));
+    const double near = std::min(1.0, 2.0 * (1.0 - distance(i) / radius));
+    const Eigen::RowVector3d place = now + (shape.row(i) - before) * turn.transpose();
+    positions_.row(i) += near * near * (3.0 - 2.0 * near) * (place - positions_.row(i));
   }
   return nodes;
 }

@@ -2,6 +2,7 @@
 #include "sharpen/surface_laplacian.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/parallel.h"
@@ -14,6 +15,8 @@ constexpr Index coarsest_size = 1500;
 /// Weight that binds a node to its place weakly, relative to its diagonal.
 constexpr double binding = 1e-7;
 constexpr int most_iterations = 12;
+/// Weight of an edge relative to the root of its nodes' diagonals, from which on it joins them in one group.
+constexpr double joining = 0.08;
 constexpr Index laplacian_grain = 4096;
 
 /// A symmetric matrix without its diagonal, as neighbours and weights of each row.
@@ -25,8 +28,8 @@ struct Graph {
   Index size() const { return static_cast<Index>(first.size()) - 1; }
 };
 
-/// Each free node and its free neighbours that are in no group yet, where none of them is; what is left joins
-/// the group of its nearest neighbour.
+/// Each free node and its free neighbours by strong edges, where none of them is in a group yet; what is left
+/// joins the group of its strongest neighbour.
 std::vector<std::int32_t> groups_of(const Graph& graph, Index& count) {
   std::vector<std::int32_t> group(graph.size(), -1);
   count = 0;
@@ -35,11 +38,16 @@ std::vector<std::int32_t> groups_of(const Graph& graph, Index& count) {
       if (!graph.held[graph.neighbour[at]]) visit(graph.neighbour[at], graph.weight[at]);
   };
   for (Index i = 0; i < graph.size(); ++i) {
+    const auto each_joined = [&](auto&& visit) {
+      each(i, [&](Index j, double weight) {
+        if (weight > joining * std::sqrt(graph.diagonal[i] * graph.diagonal[j])) visit(j);
+      });
+    };
     bool open = !graph.held[i] && group[i] < 0;
-    if (open) each(i, [&](Index j, double) { open = open && group[j] < 0; });
+    if (open) each_joined([&](Index j) { open = open && group[j] < 0; });
     if (!open) continue;
     group[i] = static_cast<std::int32_t>(count++);
-    each(i, [&](Index j, double) { group[j] = group[i]; });
+    each_joined([&](Index j) { group[j] = group[i]; });
   }
   std::vector<std::int32_t> result = group;
   for (Index i = 0; i < graph.size(); ++i) {
