@@ -13,13 +13,16 @@
 namespace arapfields {
 namespace {
 
-/// A patch is closed but for small holes if the square of its boundary's length is below this share of its
-/// area: 6.3 for half a sphere, .5 for a sphere without a cap of a fifth of its diameter.
+/// A patch is a sheet if the square of its boundary's length is more times its area: 12.6 for a disc, the
+/// least of all flat sheets. Others are bodies with or without holes: 6.3 for half a sphere, 8.2 for a cap as
+/// high as .7 of its radius.
+constexpr double long_boundary = 9.0;
+/// One below this ratio is closed but for small holes, and can have others inside: .5 for a sphere without a
+/// cap of a fifth of its diameter.
 constexpr double small_holes = 1.0;
-/// A patch is a sheet if that ratio is above this one: 12.6 for a disc, the least of all flat sheets.
-constexpr double long_boundary = 8.0;
-/// A closed patch that encloses less than this share of a cube of its area is as flat as rounding.
-constexpr double flat = 1e-9;
+/// A body that encloses less than this share of the 3/2 power of its area has no outside: a closed one that
+/// is as flat as rounding; an open one that is hollow on both sides. .13 for half a sphere.
+constexpr double flat = 1e-9, flat_with_holes = 5e-3;
 /// Vertices of a patch that tell whether it lies inside another one.
 constexpr std::size_t most_witnesses = 16;
 
@@ -66,9 +69,10 @@ struct Patch {
   double area = 0.0, turned_area = 0.0;
   double boundary = 0.0;             ///< length
   Vec3 boundary_sum = Vec3::Zero();  ///< of the boundary's edges' middles, by length
-  double volume = 0.0;               ///< with the orientation of most of it; 0: not closed
+  double volume = 0.0;               ///< with the orientation of most of it; 0: no body
   Eigen::AlignedBox3d box;
   bool turns = false;
+  double boundary_share() const { return boundary * boundary / area; }  ///< 0 where it is closed
 };
 
 /// Whether a ray from the point along x meets the triangles an odd number of times.
@@ -97,23 +101,23 @@ bool encloses(const TriangleMesh& mesh, const Patch& patch, const Vec3& point) {
 
 /// Decides which patches turn, by their volumes and by which of them lie inside others.
 void decide(const TriangleMesh& mesh, std::vector<Patch>& patches) {
-  std::vector<std::size_t> closed;
+  std::vector<std::size_t> bodies;
   bool any = false;
   for (std::size_t i = 0; i < patches.size(); ++i) {
-    if (patches[i].volume != 0.0) closed.push_back(i);
+    if (patches[i].volume != 0.0) bodies.push_back(i);
     any = any || patches[i].volume < 0.0;
   }
   if (!any) return;
-  std::stable_sort(closed.begin(), closed.end(), [&](std::size_t a, std::size_t b) {
+  std::stable_sort(bodies.begin(), bodies.end(), [&](std::size_t a, std::size_t b) {
     return std::abs(patches[a].volume) > std::abs(patches[b].volume);
   });
-  for (std::size_t k = 0; k < closed.size(); ++k) {
-    Patch& patch = patches[closed[k]];
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    Patch& patch = patches[bodies[k]];
     patch.turns = patch.volume < 0.0;
     // The smallest patch around it is the last one in the order of volumes.
     for (std::size_t l = k; l-- > 0;) {
-      const Patch& around = patches[closed[l]];
-      if (!around.box.contains(patch.box)) continue;
+      const Patch& around = patches[bodies[l]];
+      if (!(around.boundary_share() < small_holes) || !around.box.contains(patch.box)) continue;
       bool inside = true;
       const std::size_t step = std::max<std::size_t>(patch.triangles.size() / most_witnesses, 1);
       for (std::size_t i = 0; i < patch.triangles.size() && inside; i += step)
@@ -169,7 +173,7 @@ Triangles outward_triangles(const TriangleMesh& mesh, Vector* sheet_sizes) {
   for (Patch& patch : patches) {
     const bool most_turned = patch.turned_area > 0.5 * patch.area;
     for (const std::int32_t t : patch.triangles) turned[t] = turned[t] != most_turned;
-    if (!(patch.boundary * patch.boundary < small_holes * patch.area)) continue;
+    if (!(patch.boundary_share() < long_boundary)) continue;
     // Holes are closed by triangles to the middle of the boundary.
     const Vec3 origin =
         patch.boundary > 0.0 ? Vec3(patch.boundary_sum / patch.boundary) : corner(patch.triangles.front(), 0);
@@ -177,13 +181,14 @@ Triangles outward_triangles(const TriangleMesh& mesh, Vector* sheet_sizes) {
       const double part = (corner(t, 0) - origin).dot((corner(t, 1) - origin).cross(corner(t, 2) - origin));
       patch.volume += (turned[t] ? -part : part) / 6.0;
     }
-    if (std::abs(patch.volume) < flat * std::pow(patch.area, 1.5)) patch.volume = 0.0;
+    const double least = patch.boundary > 0.0 ? flat_with_holes : flat;
+    if (std::abs(patch.volume) < least * std::pow(patch.area, 1.5)) patch.volume = 0.0;
   }
   decide(mesh, patches);
   if (sheet_sizes != nullptr) {
     sheet_sizes->setZero(count);
     for (const Patch& patch : patches)
-      if (patch.boundary * patch.boundary > long_boundary * patch.area)
+      if (!(patch.boundary_share() < long_boundary))
         for (const std::int32_t t : patch.triangles) (*sheet_sizes)[t] = std::sqrt(patch.area);
   }
 

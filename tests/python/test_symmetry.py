@@ -279,6 +279,8 @@ SHAPES = {
     "hollow": together(sphere(1.0), (sphere(0.7)[0], sphere(0.7)[1][:, TURNED])),
     "eyeball": together(sphere(1.0), sphere(0.2, (0.0, 0.6, 0.1))),
     "open neck": sphere(lowest=0.12),
+    "half": sphere(lowest=0.5),
+    "head with eyes": meshes.suzanne(),  # each less than half of a ball
 }
 
 
