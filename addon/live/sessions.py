@@ -163,7 +163,7 @@ def go_back(context, source, former, kind):
     try:
         begin(context, source, kind, former.keeps_shape)
     except UserError as error:
-        jobs.add_message("ERROR", about(source.name, error))
+        jobs.add_message("ERROR", about(source.name, error), {source.session_uid})
 
 
 def follows_handles(source):
@@ -266,7 +266,7 @@ def settle(context, uid):
 def warn(session):
     """Names the carried objects that are left out."""
     for reason in session.carrying.take_warnings():
-        jobs.add_message("WARNING", about(session.source.name, reason))
+        jobs.add_message("WARNING", about(session.source.name, reason), {session.source.uid})
 
 
 def end_with_error(uid, session, error):
@@ -279,7 +279,8 @@ def end_with_error(uid, session, error):
         take_away(session)
     elif session.is_back:
         live.paused.add(uid)
-    jobs.add_message("ERROR", about(session.source.name, UserError("{error}; live mode ended", error=error)))
+    text = about(session.source.name, UserError("{error}; live mode ended", error=error))
+    jobs.add_message("ERROR", text, {session.source.uid})
     return changes
 
 
@@ -322,7 +323,8 @@ def restart(context, uid, session):
     try:
         begin(context, source, session.kind, session.keeps_shape)
     except UserError as error:
-        jobs.add_message("ERROR", about(source.name, UserError("{error}; live mode ended", error=error)))
+        text = about(source.name, UserError("{error}; live mode ended", error=error))
+        jobs.add_message("ERROR", text, {source.session_uid})
         return False
     return True
 
@@ -335,7 +337,7 @@ def return_all(context):
             with references.between():
                 begin(context, source, kind, former.keeps_shape)
         except UserError as error:
-            jobs.add_message("ERROR", about(source.name, error))
+            jobs.add_message("ERROR", about(source.name, error), {source.session_uid})
     live.returning.clear()
 
 

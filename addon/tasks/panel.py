@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The top of the panel, without a title: the object, the tasks, and the pin tool."""
+"""The top of the panel, without a title: the object, the tasks, and the pin tool; and the section that holds
+those about other objects."""
 
 import bpy
 
@@ -48,4 +49,16 @@ def counts_of(source):
     return translated("{vertices} vertices, {faces} faces", **counts)
 
 
-CLASSES = [ARAPFIELDS_PT_tasks]
+class ARAPFIELDS_PT_others(Section, bpy.types.Panel):
+    """What moves along, and what is in the way."""
+
+    bl_label = "Other Objects"
+    bl_order = 6
+    tasks = frozenset({"POSE", "STYLE", "WRAP"})
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def fill(self, context, source, settings):
+        pass
+
+
+CLASSES = [ARAPFIELDS_PT_tasks, ARAPFIELDS_PT_others]
