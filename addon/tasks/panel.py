@@ -6,9 +6,11 @@ import bpy
 
 from ..blender.language import translated
 from ..blender.point_data import face_count, points_of
-from ..blender.section import Section, tasks_of
+from ..blender.section import TASKS, Section, tasks_of
 from ..blender.splat_layouts import holds_splats
 from ..names import TOOL, Op
+
+UPPER = 3  # tasks in the upper of two rows: all in one would cut their names off
 
 
 def is_tool_taken(context):
@@ -35,7 +37,11 @@ class ARAPFIELDS_PT_tasks(Section, bpy.types.Panel):
             layout.label(text=text, icon="MESH_DATA", translate=False)  # one line, or the tasks would move
         if len(tasks_of(context)) > 1:
             layout.use_property_split = False
-            layout.row(align=True).prop(context.scene.arapfields, "task", expand=True)
+            rows = layout.column(align=True)
+            for tasks in (TASKS[:UPPER], TASKS[UPPER:]):
+                row = rows.row(align=True)
+                for task in tasks:
+                    row.prop_enum(context.scene.arapfields, "task", task)
             row = layout.row()
             row.scale_y = 1.6
             row.operator(Op.PIN_TOOL, text="Pin", icon="PINNED", depress=is_tool_taken(context))

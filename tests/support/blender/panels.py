@@ -35,6 +35,9 @@ class Layout:
         assert own or name in data.bl_rna.properties, (data, name)
         self.texts.append(options["text"] if own else options.get("text", data.bl_rna.properties[name].name))
 
+    def prop_enum(self, data, name, value):
+        self.texts.append(data.bl_rna.properties[name].enum_items[value].name)
+
     def prop_search(self, data, name, source, collection, **options):
         self.prop(data, name, **options)
         assert collection in source.bl_rna.properties
