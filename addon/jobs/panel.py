@@ -26,12 +26,9 @@ def remarks(source):
 
 
 def messages(context):
-    """The Messages about what is active, about no object, and about deleted ones."""
+    """The Messages about what is active, and about no object."""
     here = {one.session_uid for one in (source_of(context), active_of(context)) if one is not None}
-    if all(not one.about or one.about & here for one in jobs.board.messages):
-        return list(jobs.board.messages)
-    there = {item.session_uid for scene in bpy.data.scenes for item in scene.objects}
-    return [one for one in jobs.board.messages if one.about & here or not one.about & there]
+    return [one for one in jobs.board.messages if not one.about or one.about & here]
 
 
 class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
