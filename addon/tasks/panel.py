@@ -10,7 +10,7 @@ from ..blender.section import TASKS, Section, tasks_of
 from ..blender.splat_layouts import holds_splats
 from ..names import TOOL, Op
 
-UPPER = 3  # tasks in the upper of two rows: all in one would cut their names off
+ROWS = (TASKS[:3], TASKS[3:])  # in one row their names would be cut off
 
 
 def is_tool_taken(context):
@@ -38,7 +38,7 @@ class ARAPFIELDS_PT_tasks(Section, bpy.types.Panel):
         if len(tasks_of(context)) > 1:
             layout.use_property_split = False
             rows = layout.column(align=True)
-            for tasks in (TASKS[:UPPER], TASKS[UPPER:]):
+            for tasks in ROWS:
                 row = rows.row(align=True)
                 for task in tasks:
                     row.prop_enum(context.scene.arapfields, "task", task)
