@@ -190,10 +190,13 @@ def end(context, source, keep=False):
 
 
 def forget_paused(source):
-    """Ends the live state that the file or a step of undo has, without a session."""
+    """Ends the live state that the file or a step of undo has, without a session; returns whether there was
+    one."""
     live.paused.discard(source.session_uid)
-    if settings_of(source).live_kind:  # any write tags the object as updated
-        settings_of(source).live_kind = ""
+    if not settings_of(source).live_kind:  # any write tags the object as updated
+        return False
+    settings_of(source).live_kind = ""
+    return True
 
 
 def end_for_job(context, source, output, result):
@@ -204,8 +207,7 @@ def end_for_job(context, source, output, result):
     """
     session = live.get(source.session_uid)
     if session is None:
-        forget_paused(source)
-        return False
+        return forget_paused(source)
     stays = session.display.in_place and settings_of(source).result == result
     end(context, source, keep=stays and placement.keeps_mesh(output, result))
     context.view_layer.update()
