@@ -19,15 +19,15 @@ ROOT = Path(__file__).resolve().parents[1]
 STEP, INNER = 28.4, 26.0  # distance of closed sections, and of those in Advanced
 LEFT, WORDS = slice(0, 258), slice(8, 120)  # columns of a section, and of its header's text
 HEADER = 22  # height of compared strips
-BEGINNING = 103  # of the first section, below the tasks
-ADVANCED, STATUS = 5, 72  # row of Advanced, before that of the status; height of this with one line
+BEGINNING = 124  # of the first section, below the tasks
+ADVANCED, STATUS = 3, 72  # row of Advanced, before that of the status; height of this with one line
 SHOWN = (1280, 800)
 TOP = (("handles", "panel", 0), ("deform", "panel", 1), ("stylize", "panel-style", 0))  # picture, row
 WITHIN = (("surface", 0), ("result", 3))
 WINDOW = {name: name for name in ("handles", "running", "cancelled")} | {
     "live": "dragged"
 }  # blender-NAME.webp
-MENU = (940, 185, 1284, 429)  # the menu of styles with its section's header
+MENU = (940, 206, 1284, 450)  # the menu of styles with its section's header
 
 
 def pixels(path):

@@ -13,8 +13,8 @@ from . import caches
 
 class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
     bl_label = "Bake and Export"
-    bl_order = 10
-    bl_options = {"DEFAULT_CLOSED"}
+    bl_order = 9
+    tasks = frozenset({"ANIMATE"})
 
     def fill(self, context, source, settings):
         layout, bake = self.layout, settings.bake

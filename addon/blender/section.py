@@ -9,7 +9,7 @@ from ..names import CATEGORY, CONTEXT, Op
 from . import object_references
 from .language import translated
 
-TASKS = ("POSE", "STYLE", "WRAP", "RIG")
+TASKS = ("POSE", "STYLE", "WRAP", "RIG", "ANIMATE")
 
 
 def tasks_of(context):
@@ -54,6 +54,12 @@ class Advanced(Section):
 
     bl_parent_id = "ARAPFIELDS_PT_advanced"
     bl_options = {"DEFAULT_CLOSED"}
+
+
+class OfOthers(Section):
+    """Mixin of the sections within Other Objects, which is closed at first."""
+
+    bl_parent_id = "ARAPFIELDS_PT_others"
 
 
 def settings_column(layout, group, parameters, advanced):

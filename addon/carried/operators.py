@@ -6,7 +6,7 @@ import bpy
 from ..blender.language import translated
 from ..blender.object_references import in_scene, owner_of, settings_of
 from ..blender.property_definitions import choice, flag
-from ..blender.section import Section, characters, note, wrapped
+from ..blender.section import OfOthers, characters, note, wrapped
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError, refuse
 from ..core.settings.choices import CARRYING
@@ -128,11 +128,10 @@ class ARAPFIELDS_UL_carried(bpy.types.UIList):
             row.label(text="", icon="ERROR")
 
 
-class ARAPFIELDS_PT_carried(Section, bpy.types.Panel):
+class ARAPFIELDS_PT_carried(OfOthers, bpy.types.Panel):
     bl_label = "Carried Objects"
-    bl_order = 6
+    bl_order = 0
     tasks = frozenset({"POSE", "STYLE", "WRAP"})
-    bl_options = {"DEFAULT_CLOSED"}
 
     def fill(self, context, source, settings):
         layout = self.layout

@@ -3,7 +3,7 @@ import bpy
 
 from ..blender.language import translated
 from ..blender.object_references import in_scene, settings_of, source_of
-from ..blender.section import Section, draw_settings, note, switched, wrapped
+from ..blender.section import OfOthers, draw_settings, note, switched, wrapped
 from ..names import Op
 from ..solver import contact
 
@@ -23,11 +23,10 @@ class ARAPFIELDS_UL_obstacles(bpy.types.UIList):
         margin.prop(item, "margin", text="", emboss=False)
 
 
-class ARAPFIELDS_PT_contact(Section, bpy.types.Panel):
+class ARAPFIELDS_PT_contact(OfOthers, bpy.types.Panel):
     bl_label = "Contact"
-    bl_order = 8
+    bl_order = 1
     tasks = frozenset({"POSE", "STYLE"})
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context):
         self.layout.prop(settings_of(source_of(context)).contact, "use", text="")

@@ -39,8 +39,9 @@ class ARAPFIELDS_PT_deform_settings(Advanced, bpy.types.Panel):
     tasks = frozenset({"POSE"})
 
     def fill(self, context, source, settings):
-        if 0 <= settings.active_handle < len(settings.handles):  # the one chosen in the list
-            draw_settings(self.layout, settings.handles[settings.active_handle], "weight")
+        entry = empties.chosen_entry(source)
+        if entry is not None:
+            draw_settings(self.layout, entry, "weight")
         settings_column(self.layout, settings.deform, DEFORM, advanced=True)
 
 

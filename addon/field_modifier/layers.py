@@ -60,7 +60,7 @@ def switch_copies_off(source):
         if modifier.show_viewport or modifier.show_render:
             modifier.show_viewport = modifier.show_render = False
             text = translated("{name} is a second copy and was switched off", name=modifier.name)
-            jobs.add_message("WARNING", f"{source.name}: {text}")
+            jobs.add_message("WARNING", f"{source.name}: {text}", {source.session_uid})
 
 
 # Layers: earlier results that later ones act on, a style on a wrap, a deformation on both.

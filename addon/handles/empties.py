@@ -142,6 +142,17 @@ def used(source):
     return [entry for entry in settings_of(source).handles if has_mover(entry)]
 
 
+def listed(source):
+    """The handles that the panel lists: also those whose Empties or bones were deleted."""
+    return [entry for entry in settings_of(source).handles if not movers.is_copied(entry)]
+
+
+def chosen_entry(source):
+    """The handle in the active row of the list, or None."""
+    handles, row = settings_of(source).handles, settings_of(source).active_handle
+    return handles[row] if 0 <= row < len(handles) and not movers.is_copied(handles[row]) else None
+
+
 def lost_bone(source):
     """UserError that names a bone missing in its armature; else None."""
     for entry in settings_of(source).handles:

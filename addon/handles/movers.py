@@ -173,11 +173,17 @@ def bone_box(bone):
 
 
 def owner_elsewhere(entry):
-    """The other object that owns an entry's Empty, or None: duplicates of a source list the same Empties."""
+    """The other object that owns an entry's Empty, or None: duplicates of a source have the same Empties."""
     owner = settings_of(entry.empty).handle_of
     if owner in (None, entry.id_data) or not in_scene(owner):
         return None
     return owner if any(one.empty == entry.empty for one in settings_of(owner).handles) else None
+
+
+def is_copied(entry):
+    """Whether an entry came with a duplicate of its object, and its Empty is the first's: it is no handle
+    until the first is deleted."""
+    return entry.kind != "BONE" and in_scene(entry.empty) and owner_elsewhere(entry) is not None
 
 
 def has_mover(entry):

@@ -28,7 +28,7 @@ class HandleOperator(SourceOperator):
 
     @classmethod
     def refuses(cls, source):
-        without = cls.needs_handle and not settings_of(source).handles
+        without = cls.needs_handle and not empties.listed(source)
         return UserError("The object has no handle") if without else None
 
     def warn(self, context):
@@ -40,7 +40,6 @@ class HandleOperator(SourceOperator):
 
 def chosen_entries(context, source):
     """The handles whose Empties are selected, or the active one of the list."""
-    settings = settings_of(source)
     selected = [entry for entry in empties.used(source) if is_selected(context, entry)]
     if selected:
         return selected
@@ -49,8 +48,7 @@ def chosen_entries(context, source):
         raise UserError(
             "{name} is a copy of a handle and is none itself; add it as a handle first", copies[0]
         )
-    index = settings.active_handle
-    return [settings.handles[index]] if 0 <= index < len(settings.handles) else []
+    return list(filter(None, [empties.chosen_entry(source)]))
 
 
 def is_selected(context, entry):

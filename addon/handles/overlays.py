@@ -144,9 +144,8 @@ def segments(source, across=FLAT):
 
 def chosen_of(source):
     """The handle in the active row of an active source, or None."""
-    handles, row = settings_of(source).handles, settings_of(source).active_handle
     is_active = bpy.context.view_layer.objects.active == source
-    return handles[row] if is_active and 0 <= row < len(handles) else None
+    return empties.chosen_entry(source) if is_active else None
 
 
 def outline(kind, rest, now, thick):

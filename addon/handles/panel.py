@@ -3,7 +3,7 @@ import bpy
 
 from ..blender import icons
 from ..blender.language import translated
-from ..blender.object_references import in_scene, source_of
+from ..blender.object_references import source_of
 from ..blender.section import Section, draw_settings, group_row, note, switched, wrapped
 from ..names import Op
 from . import empties, movers
@@ -17,21 +17,15 @@ def anchor_icon(entry):
     return {"icon_value": number} if number else {"icon": "PINNED" if entry.anchor else "LAYER_USED"}
 
 
-def draw_lost(row, entry):
-    """Draws the row of a handle without a mover, or whose Empty belongs to another object."""
-    owner = movers.owner_elsewhere(entry) if entry.kind != "BONE" and in_scene(entry.empty) else None
-    if owner is None:
-        row.label(text="(deleted)", icon="ERROR")
-    else:
-        text = translated("{name} (of {owner})", name=entry.empty.name, owner=owner.name)
-        row.label(text=text, icon="ERROR", translate=False)
-
-
 class ARAPFIELDS_UL_handles(bpy.types.UIList):
+    def filter_items(self, context, data, propname):
+        entries = getattr(data, propname)
+        return [0 if movers.is_copied(entry) else self.bitflag_filter_item for entry in entries], []
+
     def draw_item(self, context, layout, data, item, icon, active_data, active_propname, index):
         row = layout.row(align=True)
         if not movers.has_mover(item):
-            draw_lost(row, item)
+            row.label(text="(deleted)", icon="ERROR")
             return
         swatch = row.row()
         swatch.ui_units_x = 0.8
@@ -96,7 +90,7 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
         column.operator(Op.REMOVE_HANDLE, icon="REMOVE", text="")
         column.separator()
         column.menu("ARAPFIELDS_MT_more_handle", icon="DOWNARROW_HLT", text="")
-        if not settings.handles:
+        if not empties.listed(source):
             hint = translated("Drag the shape with the pin tool, or press + for a pin or a box")
             wrapped(layout, hint, icon="INFO")
             return
@@ -104,8 +98,8 @@ class ARAPFIELDS_PT_handles(Section, bpy.types.Panel):
             switched(layout, settings, "keep_rest", "keep_beyond")
         layout.operator(Op.RESET_HANDLE, icon="LOOP_BACK")
         layout.operator(Op.SET_REST, icon="PINNED")
-        if 0 <= settings.active_handle < len(settings.handles):
-            entry = settings.handles[settings.active_handle]
+        entry = empties.chosen_entry(source)
+        if entry is not None:
             draw_settings(layout, entry, "reach")
             if entry.kind in empties.PINS:
                 draw_settings(layout, entry, "hold_turn")

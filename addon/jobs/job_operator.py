@@ -11,6 +11,7 @@ from ..blender.language import about, translated
 from ..blender.object_references import (
     ObjectReference,
     SceneReference,
+    active_of,
     is_source,
     owner_of,
     refusal,
@@ -141,6 +142,7 @@ class JobOperator(ModalRun, Guided):
 
     title = ""
     worked_on = ()  # ObjectReferences; once all of these objects are deleted, the job ends
+    about = frozenset()  # session_uids of the objects that its messages concern
 
     scope: choice(SCOPES, "Objects", "Which objects to work on", options={"SKIP_SAVE"})
 
@@ -193,10 +195,13 @@ class JobOperator(ModalRun, Guided):
     def coroutine(self, context):
         """Coroutine of the job's main-thread work; returns the operator's result."""
         self.failures, self.warnings, self.successes = [], [], []
+        self.about = {one.session_uid for one in (source_of(context), active_of(context)) if one is not None}
         job = jobs.Job(self.title, [], native.library().Task, low_priority=self.in_window)
         jobs.begin(job, start=False)
         try:
-            job.start((yield from self.prepare(context, job)))
+            items = yield from self.prepare(context, job)
+            self.about |= {one.uid for one in (*self.worked_on, *(o for item in items for o in item.edits))}
+            job.start(items)
             yield from self.work_beside(context, job)
             while not job.done:
                 if self.losses():
@@ -283,7 +288,7 @@ class JobOperator(ModalRun, Guided):
         return False
 
     def add_message(self, level, text):
-        jobs.add_message(level, text)
+        jobs.add_message(level, text, self.about)
         self.report({level}, text)
 
 

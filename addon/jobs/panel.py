@@ -3,7 +3,7 @@ import bpy
 
 from ..blender import modifier_stack
 from ..blender.language import translated
-from ..blender.object_references import settings_of, source_of
+from ..blender.object_references import active_of, settings_of, source_of
 from ..blender.point_data import shape_keys_of
 from ..blender.section import Section, wrapped
 from ..core.runtime import jobs
@@ -25,8 +25,14 @@ def remarks(source):
         yield translated("Works on the shape keys as they are set now")
 
 
+def messages(context):
+    """The Messages about what is active, and about no object."""
+    here = {one.session_uid for one in (source_of(context), active_of(context)) if one is not None}
+    return [one for one in jobs.board.messages if not one.about or one.about & here]
+
+
 class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
-    """Remarks and messages. It is the last panel, so that none moves when it changes."""
+    """Remarks and messages about what is active. It is the last panel, so that none moves when it changes."""
 
     bl_label = "Status"
     bl_order = 12
@@ -34,14 +40,14 @@ class ARAPFIELDS_PT_status(Section, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and bool(jobs.messages() or any(remarks(source_of(context))))
+        return super().poll(context) and bool(messages(context) or any(remarks(source_of(context))))
 
     def fill(self, context, source, settings):
         layout = self.layout
         for text in remarks(source):
             wrapped(layout, text, icon="INFO")
-        for level, text in jobs.messages():
-            wrapped(layout, text, icon=ICONS[level])
+        for message in messages(context):
+            wrapped(layout, message.text, icon=ICONS[message.level])
 
 
 CLASSES = [ARAPFIELDS_PT_status]

@@ -7,7 +7,7 @@ from ..blender import modifier_stack, vertex_groups
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
 from ..blender.section import (
-    Advanced,
+    Section,
     cancel_button,
     draw_settings,
     group_row,
@@ -96,10 +96,11 @@ def playback_progress(layout, source, kind):
         layout.progress(factor=count / max(1, total), text=text)
 
 
-class ARAPFIELDS_PT_secondary(Advanced, bpy.types.Panel):
+class ARAPFIELDS_PT_secondary(Section, bpy.types.Panel):
     bl_label = "Secondary Motion"
-    bl_order = 6
-    tasks = frozenset({"POSE"})
+    bl_order = 10
+    tasks = frozenset({"ANIMATE"})
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context):
         self.layout.prop(settings_of(source_of(context)).secondary, "use", text="")

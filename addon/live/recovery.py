@@ -151,7 +151,7 @@ def adopt(source):
     elif not in_scene(source) or not is_moved(source):
         return
     text = translated("it was live when the file was saved; its shape is kept as a result")
-    jobs.add_message("INFO", f"{source.name}: {text}")
+    jobs.add_message("INFO", f"{source.name}: {text}", {source.session_uid})
 
 
 def is_moved(source):
@@ -204,7 +204,7 @@ def warn_of_hidden(source, session, depsgraph):
         text = translated("Renders do not follow what is hidden in them: {names}", names=", ".join(hidden))
         message = "WARNING", f"{source.name}: {text}"
         if message not in jobs.messages():
-            jobs.add_message(*message)
+            jobs.add_message(*message, {source.session_uid})
 
 
 # Viewport overlay that draws a live shape's contact points.

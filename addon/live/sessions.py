@@ -163,7 +163,7 @@ def go_back(context, source, former, kind):
     try:
         begin(context, source, kind, former.keeps_shape)
     except UserError as error:
-        jobs.add_message("ERROR", about(source.name, error))
+        jobs.add_message("ERROR", about(source.name, error), {source.session_uid})
 
 
 def follows_handles(source):
@@ -190,10 +190,13 @@ def end(context, source, keep=False):
 
 
 def forget_paused(source):
-    """Ends the live state that the file or a step of undo has, without a session."""
+    """Ends the live state that the file or a step of undo has, without a session; returns whether there was
+    one."""
     live.paused.discard(source.session_uid)
-    if settings_of(source).live_kind:  # any write tags the object as updated
-        settings_of(source).live_kind = ""
+    if not settings_of(source).live_kind:  # any write tags the object as updated
+        return False
+    settings_of(source).live_kind = ""
+    return True
 
 
 def end_for_job(context, source, output, result):
@@ -204,8 +207,7 @@ def end_for_job(context, source, output, result):
     """
     session = live.get(source.session_uid)
     if session is None:
-        forget_paused(source)
-        return False
+        return forget_paused(source)
     stays = session.display.in_place and settings_of(source).result == result
     end(context, source, keep=stays and placement.keeps_mesh(output, result))
     context.view_layer.update()
@@ -266,7 +268,7 @@ def settle(context, uid):
 def warn(session):
     """Names the carried objects that are left out."""
     for reason in session.carrying.take_warnings():
-        jobs.add_message("WARNING", about(session.source.name, reason))
+        jobs.add_message("WARNING", about(session.source.name, reason), {session.source.uid})
 
 
 def end_with_error(uid, session, error):
@@ -279,7 +281,8 @@ def end_with_error(uid, session, error):
         take_away(session)
     elif session.is_back:
         live.paused.add(uid)
-    jobs.add_message("ERROR", about(session.source.name, UserError("{error}; live mode ended", error=error)))
+    text = about(session.source.name, UserError("{error}; live mode ended", error=error))
+    jobs.add_message("ERROR", text, {session.source.uid})
     return changes
 
 
@@ -322,7 +325,8 @@ def restart(context, uid, session):
     try:
         begin(context, source, session.kind, session.keeps_shape)
     except UserError as error:
-        jobs.add_message("ERROR", about(source.name, UserError("{error}; live mode ended", error=error)))
+        text = about(source.name, UserError("{error}; live mode ended", error=error))
+        jobs.add_message("ERROR", text, {source.session_uid})
         return False
     return True
 
@@ -335,7 +339,7 @@ def return_all(context):
             with references.between():
                 begin(context, source, kind, former.keeps_shape)
         except UserError as error:
-            jobs.add_message("ERROR", about(source.name, error))
+            jobs.add_message("ERROR", about(source.name, error), {source.session_uid})
     live.returning.clear()
 
 

@@ -170,7 +170,7 @@ def make_way(context, source):
         ended = sessions.end_for_kind(context, source, kind_of(source))
         reason = layers.replaced(source, kind_of(source))
         if reason is not None:
-            jobs.add_message("WARNING", translated(reason))
+            jobs.add_message("WARNING", translated(reason), {source.session_uid})
         way = layers.make_way(source, kind_of(source))
     return ended, way
 

@@ -166,11 +166,8 @@ def chosen(context):
         return None
     if active.type == "EMPTY":
         return active if entry_of(active) is not None else None
-    handles, row = settings_of(active).handles, settings_of(active).active_handle
-    if not object_references.is_source(active) or not 0 <= row < len(handles):
-        return None
-    entry = handles[row]
-    is_empty = entry.kind != "BONE" and movers.has_mover(entry)
+    entry = empties.chosen_entry(active) if object_references.is_source(active) else None
+    is_empty = entry is not None and entry.kind != "BONE" and movers.has_mover(entry)
     return entry.empty if is_empty and entry.empty.visible_get() else None
 
 
@@ -231,7 +228,7 @@ def warn_of_moves(source):
             source,
             modifier=moving[-1].name,
         )
-        jobs.add_message("WARNING", translated(error))
+        jobs.add_message("WARNING", translated(error), {source.session_uid})
 
 
 def hold_turn(entry, holds):

@@ -164,7 +164,7 @@ class ARAPFIELDS_UL_poses(bpy.types.UIList):
 
 class ARAPFIELDS_PT_poses(Section, bpy.types.Panel):
     bl_label = "Poses"
-    bl_order = 9
+    bl_order = 8
     tasks = frozenset({"RIG"})
     bl_options = {"DEFAULT_CLOSED"}
 

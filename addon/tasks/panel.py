@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The top of the panel, without a title: the object, the tasks, and the pin tool."""
+"""The top of the panel, without a title: the object, the tasks, and the pin tool; and the section that holds
+those about other objects."""
 
 import bpy
 
 from ..blender.language import translated
 from ..blender.point_data import face_count, points_of
-from ..blender.section import Section, tasks_of
+from ..blender.section import TASKS, Section, tasks_of
 from ..blender.splat_layouts import holds_splats
 from ..names import TOOL, Op
+
+ROWS = (TASKS[:3], TASKS[3:])  # in one row their names would be cut off
 
 
 def is_tool_taken(context):
@@ -34,7 +37,11 @@ class ARAPFIELDS_PT_tasks(Section, bpy.types.Panel):
             layout.label(text=text, icon="MESH_DATA", translate=False)  # one line, or the tasks would move
         if len(tasks_of(context)) > 1:
             layout.use_property_split = False
-            layout.row(align=True).prop(context.scene.arapfields, "task", expand=True)
+            rows = layout.column(align=True)
+            for tasks in ROWS:
+                row = rows.row(align=True)
+                for task in tasks:
+                    row.prop_enum(context.scene.arapfields, "task", task)
             row = layout.row()
             row.scale_y = 1.6
             row.operator(Op.PIN_TOOL, text="Pin", icon="PINNED", depress=is_tool_taken(context))
@@ -48,4 +55,16 @@ def counts_of(source):
     return translated("{vertices} vertices, {faces} faces", **counts)
 
 
-CLASSES = [ARAPFIELDS_PT_tasks]
+class ARAPFIELDS_PT_others(Section, bpy.types.Panel):
+    """What moves along, and what is in the way."""
+
+    bl_label = "Other Objects"
+    bl_order = 6
+    tasks = frozenset({"POSE", "STYLE", "WRAP"})
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def fill(self, context, source, settings):
+        pass
+
+
+CLASSES = [ARAPFIELDS_PT_tasks, ARAPFIELDS_PT_others]

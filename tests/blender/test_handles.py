@@ -13,7 +13,7 @@ if IN_BLENDER:
     from support.blender import scenes
     from support.blender.baking import animated
     from support.blender.live import pin, step
-    from support.blender.panels import drawn
+    from support.blender.panels import drawn, listed
     from support.blender.skins import rigged_bar
 
     from addon.blender.object_references import owner_of, source_of
@@ -754,12 +754,28 @@ def test_a_copy_is_not_pulled_to_the_handles_of_the_first(linked):
     assert np.array_equal(scenes.world_points(copied), moved)
 
 
-@pytest.mark.parametrize("delete", [False, True])
-def test_a_row_of_a_copy_goes_without_the_handle_of_the_first(delete):
-    bar, copied, empty = posed_and_copied(linked=False)
-    assert bpy.ops.arapfields.remove_handle(delete=delete) == {"FINISHED"}
-    assert not copied.arapfields.handles
+def rows(source):
+    """The Empties in the list of handles."""
+    return [entry.empty for _, entry in listed("ARAPFIELDS_UL_handles", source.arapfields, "handles")]
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_copy_without_its_empties_has_no_handles(linked):
+    """Neither listed nor worked on: the first keeps them, and the copy's own are what is made on it."""
+    bar, copied, empty = posed_and_copied(linked)
+    texts = drawn()["ARAPFIELDS_PT_handles"]
+    assert not rows(copied) and not {"World", "Reach", "(deleted)"} & {*texts}, texts
+    assert "press + for a pin" in " ".join(texts)
+    for operator in ("remove_handle", "set_rest", "reset_handle", "mirror_handle"):
+        with pytest.raises(RuntimeError, match="The object has no handle"):
+            getattr(bpy.ops.arapfields, operator)()
+    own = pin(copied, (-1.0, 3.0, 0.25), target=(-1.0, 3.0, 0.6))
+    assert rows(copied) == [own] and drawn()["ARAPFIELDS_PT_handles"].count("World") == 1
+    assert bpy.ops.arapfields.remove_handle(delete=True) == {"FINISHED"}
+    assert not rows(copied) and "World" not in drawn()["ARAPFIELDS_PT_handles"]
     assert owner_of(empty) == bar and [entry.empty for entry in empties.used(bar)] == [empty]
+    scenes.activate(bar)
+    assert rows(bar) == [empty] and drawn()["ARAPFIELDS_PT_handles"].count("World") == 1
 
 
 def test_a_copy_that_is_left_has_the_handles():

@@ -323,6 +323,21 @@ def shown_meshes():
     return {item.name: scenes.world_points(item) for item in meshes}
 
 
+def test_a_failed_run_that_ends_a_waiting_live_state_is_a_step_of_undo():
+    """Undo has brought the state back, but an error keeps its session from starting again."""
+    bar, _, moving = scenes.bar_with_handles()
+    moving.location.z += 50.0
+    bpy.context.view_layer.update()
+    scenes.activate(moving)
+    bpy.ops.arapfields.set_rest()  # there it holds nothing, which the solve refuses
+    bar.arapfields.live_kind = "DEFORM"
+    sessions.live.paused.add(bar.session_uid)
+    pushed = references.pushed
+    with pytest.raises(RuntimeError, match="No part of the surface"):
+        bpy.ops.arapfields.deform(**scenes.QUICK)
+    assert not bar.arapfields.live_kind and references.pushed == pushed + 1
+
+
 @pytest.mark.parametrize("result", ["MODIFIER", "NEW"])
 @pytest.mark.parametrize("fails", ["at once", "later"])
 def test_a_refused_press_of_another_kind_leaves_live_mode(result, fails):

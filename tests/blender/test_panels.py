@@ -84,7 +84,7 @@ def test_the_panel_draws(state):
     else:
         said = "ARAPFIELDS_PT_status" in shown
         hinders = "ARAPFIELDS_PT_source" in shown
-        assert len(shown) == 18 + said + hinders and hinders == (state == "edit mode")
+        assert len(shown) == 19 + said + hinders and hinders == (state == "edit mode")
         assert said == (state in ("modifiers and keys", "fitted", "fit cleared", "a failure"))
     if state in EXPECTED:
         section, text = EXPECTED[state]
@@ -98,13 +98,15 @@ def test_each_task_shows_its_few_sections():
         classes = [cls for module in registration.MODULES for cls in module.CLASSES]
         panels = [c for c in classes if issubclass(c, bpy.types.Panel) and not hasattr(c, "bl_parent_id")]
         shown[task] = {c.bl_label for c in panels if c.poll(bpy.context)}
-    always = {"Tasks", "Bake and Export", "Advanced"}
+    always = {"Tasks", "Advanced"}
     assert {task: names - always for task, names in shown.items()} == {
-        "POSE": {"Handles", "Deform", "Carried Objects", "Contact"},
-        "STYLE": {"Stylize", "Carried Objects", "Contact"},
-        "WRAP": {"Wrap", "Carried Objects"},
+        "POSE": {"Handles", "Deform", "Other Objects"},
+        "STYLE": {"Stylize", "Other Objects"},
+        "WRAP": {"Wrap", "Other Objects"},
         "RIG": {"Skin", "Poses"},
+        "ANIMATE": {"Bake and Export", "Secondary Motion"},
     }
+    assert all(2 <= len(names - {"Tasks"}) <= 4 for names in shown.values())
     assert all(always <= names for names in shown.values())
 
 
@@ -148,11 +150,13 @@ def test_everyday_sections_come_first_and_numbers_are_under_advanced():
     jobs.board.messages.clear()
     panels = {name: getattr(bpy.types, name) for name in shown_texts if "_PT_" in name}
     first = {n: cls.bl_order for n, cls in panels.items() if not hasattr(cls, "bl_parent_id")}
-    folded = ["carried", "contact", "poses", "animation", "advanced"]
-    order = ["tasks", "handles", "deform", "stylize", "wrap", "skin", *folded, "status"]
+    order = ["tasks", "handles", "deform", "stylize", "wrap", "skin", "others", "poses", "animation"]
+    order += ["secondary", "advanced", "status"]
     assert sorted(first, key=first.get) == [f"ARAPFIELDS_PT_{name}" for name in order]
     closed = {name for name, cls in panels.items() if "DEFAULT_CLOSED" in getattr(cls, "bl_options", ())}
-    assert closed == {*panels} - {*first} | {f"ARAPFIELDS_PT_{name}" for name in folded}
+    others = {f"ARAPFIELDS_PT_{name}" for name in ("carried", "contact")}  # open in Other Objects
+    folded = {f"ARAPFIELDS_PT_{name}" for name in ("others", "poses", "secondary", "advanced")}
+    assert closed == {*panels} - {*first} - others | folded
     jargon = {"Samples", "Iterations", "Handle Weight", "Geometry", "Resolution", "No Limit"}
     for name, texts in shown_texts.items():
         if name in first:
@@ -298,6 +302,54 @@ def test_the_fold_barrier_acts_on_every_field(field):
         assert bpy.ops.arapfields.deform(**scenes.QUICK, field=field, barrier=barrier) == {"FINISHED"}
         shapes.append(scenes.world_points(bpy.data.objects["Bar"]))
     assert abs(shapes[1] - shapes[0]).max() > 1e-3
+
+
+def said_of(item):
+    """The lines of Status while an object is active; None where there is none."""
+    scenes.activate(item)
+    return drawn().get("ARAPFIELDS_PT_status")
+
+
+def test_status_is_that_of_the_active_object():
+    bar, fixed, moving = scenes.bar_with_handles()
+    other = bar.copy()
+    other.data, other.name = bar.data.copy(), "Other"
+    bpy.context.collection.objects.link(other)
+    moving.location.z += 0.5
+    scenes.activate(bar)
+    bpy.ops.arapfields.deform(**scenes.QUICK)
+    done = said_of(bar)
+    assert any("Bar" in text for text in done) and said_of(fixed) == said_of(moving) == done
+    assert said_of(other) is None and said_of(bar) == done
+    scenes.activate(other)
+    bpy.ops.arapfields.stylize(style="CUBE", **scenes.QUICK)
+    assert any("Other" in text for text in said_of(other)) and said_of(bar) is None
+    scenes.activate(other, bar)
+    bpy.ops.arapfields.stylize(style="CUBE", scope="SELECTED", **scenes.QUICK)
+    assert said_of(bar) == said_of(other) and {"Bar", "Other"} <= {
+        text.split(":")[0] for text in said_of(bar)
+    }
+
+
+def test_status_has_what_is_about_no_object():
+    bar, _, _ = scenes.bar_with_handles()
+    other = scenes.bar("Other")
+    jobs.add_message("INFO", "Deform cancelled")
+    jobs.add_message("ERROR", "Bar is flat", {bar.session_uid})
+    assert said_of(other) == ["Deform cancelled"] and said_of(bar) == ["Deform cancelled", "Bar is flat"]
+    bpy.data.objects.remove(bar)
+    assert said_of(other) == ["Deform cancelled"]
+    jobs.forget_messages()
+
+
+def test_a_live_shape_says_it_of_its_object():
+    bar, _, _ = scenes.bar_with_handles()
+    other = scenes.bar("Other")
+    scenes.activate(bar)
+    bpy.ops.arapfields.live()
+    sessions.end_with_error(bar.session_uid, sessions.live[bar.session_uid], UserError("no"))
+    assert said_of(other) is None and "live mode ended" in " ".join(said_of(bar))
+    jobs.forget_messages()
 
 
 def test_one_button_poses_and_one_undoes_it():

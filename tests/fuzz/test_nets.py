@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Short runs of the fuzzers: the cases raise every error of the readers, and fail in no other way."""
 
+import functools
+
 import numpy as np
 import pytest
 from support.blender.inside import require_bpy
@@ -34,23 +36,23 @@ ELSEWHERE = {
 }
 
 
-@pytest.fixture(scope="module")
-def findings():
-    return {}
+@functools.cache
+def outcome_of(target):
+    return run_target(target, seed=3, count=COUNTS[target])
 
 
 @pytest.mark.parametrize("target", COUNTS)
-def test_nothing_but_documented_errors(target, findings):
-    outcome = findings[target] = run_target(target, seed=3, count=COUNTS[target])
+def test_nothing_but_documented_errors(target):
+    outcome = outcome_of(target)
     assert sum(outcome.outcomes.values()) == COUNTS[target]
     assert not outcome.failures, outcome.failures[:3]
     if target != "records":  # these count as damaged instead
         assert outcome.outcomes["refused"] > COUNTS[target] // 10
 
 
-def test_the_readers_refusals_are_reached(findings):
+def test_the_readers_refusals_are_reached():
     assert len(refusals()) > 30
-    texts = findings["fields"].texts | findings["sdfs"].texts
+    texts = outcome_of("fields").texts | outcome_of("sdfs").texts
     missed = [r for r in unreached(texts) if not ELSEWHERE & set(r[2])]
     assert not missed, missed
 

@@ -10,11 +10,13 @@ from addon.preferences import ARAPFIELDS_AP_preferences, show
 from addon.registration import CLASSES
 from addon.tasks.panel import ARAPFIELDS_PT_tasks
 
-PANEL, ADVANCED = "ARAPFIELDS_PT_", "ARAPFIELDS_PT_advanced"
-HEADER, STEP = (1120, 200), 28.4  # the first section below the tasks, and the distance of closed sections
+PANEL = "ARAPFIELDS_PT_"
+ADVANCED, OBJECTS = "ARAPFIELDS_PT_advanced", "ARAPFIELDS_PT_others"
+HEADER, STEP = (1120, 221), 28.4  # the first section below the tasks, and the distance of closed sections
 INNER = 26.0  # distance of closed sections in Advanced
 OTHERS = {"stylize": "STYLE", "wrap": "WRAP", "skin": "RIG", "poses": "RIG"}  # tasks of sections but POSE
-STYLES = (1150, 230)  # the menu of styles, if its section were the first
+OTHERS |= {"animation": "ANIMATE", "secondary": "ANIMATE"}
+STYLES = (1150, 251)  # the menu of styles, if its section were the first
 SIDEBAR = (1028, 84, 258, 820)  # left, top, width, height
 
 
@@ -40,7 +42,9 @@ def checks(figures, folder):
     yield from open_alone({"handles", "deform"})
     bar.modifiers.clear()
     bar.arapfields.surface = "EXACT"
-    figures["sections"] = len({row for _ in panels.each_task() for row in (*rows(), *rows(ADVANCED))})
+    figures["sections"] = len(
+        {row for _ in panels.each_task() for row in (*rows(), *rows(ADVANCED), *rows(OBJECTS))}
+    )
 
 
 def rows(parent=None):

@@ -77,6 +77,10 @@ class Measured(panels.Layout):
         for item in prop.enum_items if prop.type == "ENUM" and not options.get("expand") else ():
             self.note(item.name, values - (PADDING if prop.is_enum_flag else ICON))
 
+    def prop_enum(self, data, name, value):
+        super().prop_enum(data, name, value)
+        self.buttons.append((self.texts.pop(), 0))
+
     def operator(self, name, **options):
         given = super().operator(name, **options)
         button = (self.texts.pop(), ICON if options.get("icon", "NONE") != "NONE" else 0)

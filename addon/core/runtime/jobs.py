@@ -8,7 +8,7 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import UserError, as_user_error
 from .threads import start_thread
@@ -303,6 +303,14 @@ def run_item(item, tracker):
     return outcome
 
 
+class Message(NamedTuple):
+    """A line for the panel. `about`: session_uids of the objects that it concerns; none for no one object."""
+
+    level: str  # INFO, WARNING or ERROR
+    text: str
+    about: frozenset = frozenset()
+
+
 class Board:
     """The running job, if any, and the messages of the last one; the panel shows both."""
 
@@ -342,9 +350,9 @@ def progress():
     return (job.fraction, job.message) if job is not None else (0.0, "")
 
 
-def add_message(level, text):
-    """Adds a line to the panel's messages, of level INFO, WARNING or ERROR."""
-    board.messages.append((level, text))
+def add_message(level, text, about=()):
+    """Adds a Message."""
+    board.messages.append(Message(level, text, frozenset(about)))
 
 
 def forget_messages():
@@ -352,4 +360,5 @@ def forget_messages():
 
 
 def messages():
-    return list(board.messages)
+    """[(level, text)], whatever they are about."""
+    return [(message.level, message.text) for message in board.messages]

@@ -156,6 +156,7 @@ TASKS = [
     ("STYLE", "Style", "Shapes as of cubes, or of any object"),
     ("WRAP", "Wrap", "One mesh onto another"),
     ("RIG", "Rig", "Weights of an armature, and stored poses"),
+    ("ANIMATE", "Animate", "Frames as keys and files, and what swings by itself"),
 ]
 
 

@@ -35,6 +35,9 @@ class Layout:
         assert own or name in data.bl_rna.properties, (data, name)
         self.texts.append(options["text"] if own else options.get("text", data.bl_rna.properties[name].name))
 
+    def prop_enum(self, data, name, value):
+        self.texts.append(data.bl_rna.properties[name].enum_items[value].name)
+
     def prop_search(self, data, name, source, collection, **options):
         self.prop(data, name, **options)
         assert collection in source.bl_rna.properties
@@ -52,7 +55,7 @@ class Layout:
         assert hasattr(bpy.types, name), name
 
     def template_list(self, kind, _, data, name, active_data, active, **options):
-        for row, item in enumerate(getattr(data, name)):
+        for row, item in listed(kind, data, name):
             getattr(bpy.types, kind).draw_item(None, bpy.context, self, data, item, 0, data, active, row)
 
     def label(self, text="", **options):
@@ -75,6 +78,17 @@ class Layout:
         return self
 
     column = box = grid_flow = row
+
+
+def listed(kind, data, name):
+    """[(row, item)] of the items that a list of that kind shows."""
+    drawer, items = getattr(bpy.types, kind), list(enumerate(getattr(data, name)))
+    if "filter_items" not in vars(drawer):
+        return items
+    stand_in = type("List", (), {"bitflag_filter_item": 1 << 30})()
+    shown, order = drawer.filter_items(stand_in, bpy.context, data, name)
+    assert len(shown) == len(items) and not order
+    return [one for one, is_shown in zip(items, shown, strict=True) if is_shown]
 
 
 def each_task():
