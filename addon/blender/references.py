@@ -142,6 +142,8 @@ def copy_modifiers(item, given):
     partial = []
     for one in given:
         made = item.modifiers.new(one.name, one.type)
+        # Blender 5.2 puts new hooks first.
+        item.modifiers.move(item.modifiers.find(made.name), len(item.modifiers) - 1)
         copy_properties(one, made)
         if one.type == "HOOK" and len(one.vertex_indices):
             made.vertex_indices_set(list(one.vertex_indices))

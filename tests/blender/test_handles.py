@@ -608,7 +608,9 @@ def test_a_library_override_keeps_its_pose_and_takes_its_handles_along():
     with bpy.data.libraries.load(path, link=True) as (_, into):
         into.collections = ["Character"]
     context = bpy.context
+    context.scene.collection.children.link(into.collections[0])  # Blender 5.3 overrides only what a scene has
     into.collections[0].override_hierarchy_create(context.scene, context.view_layer, do_fully_editable=True)
+    context.scene.collection.children.unlink(into.collections[0])
     item = next(one for one in bpy.data.objects if one.override_library and one.type == "MESH")
     context.view_layer.update()
     assert np.array_equal(scenes.world_points(item), posed)

@@ -560,6 +560,8 @@ def instances(item):
 def test_instances_turn_and_curves_bend():
     bar, moving = body()
     cubes, hair, cord = instancer(), rider("CURVES"), rider("CURVE")
+    if not hasattr(cord, "evaluated_geometry"):
+        pytest.skip("this Blender tells scripts no evaluated curves")
     spline = cord.data.splines.new("BEZIER")
     spline.bezier_points.add(1)
     for number, point in enumerate(spline.bezier_points):

@@ -695,6 +695,7 @@ def garment(name, inside):
         group.add([index], float(np.clip(height, 0, 1)), "REPLACE")
     item.shape_key_add(name="Basis")
     key = item.shape_key_add(name="Long")
+    key.value = 0.0  # new keys of Blender 5.2 have 1
     mesh_arrays.put_vectors(key.data, longer(vertices), "co")
     return item, vertices
 
@@ -816,6 +817,7 @@ def worn_over(child, name, part, bones, loose=0.02):
     character.weigh(item, bones)
     item.shape_key_add(name="Basis")
     key = item.shape_key_add(name="Long")
+    key.value = 0.0  # new keys of Blender 5.2 have 1
     mesh_arrays.put_vectors(key.data, longer(points_of_mesh(item.data)), "co")
     return item
 

@@ -132,11 +132,15 @@ def main():
     print(f"USED {bpy.app.version_string}, Python {sys.version.split()[0]}, NumPy {numpy.__version__}")
 
 
-if __name__ == "__main__":
-    main()
-    sys.stdout.flush()
+def leave():
+    """Ends a bpy 4.2, which would free update callbacks of add-ons after Python's end, and crash."""
     import bpy
 
+    sys.stdout.flush()
     if not hasattr(bpy.app, "module") and not bpy.app.binary_path:
-        # bpy 4.2 frees update callbacks of a removed add-on after Python's end, and crashes.
         os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
+    leave()

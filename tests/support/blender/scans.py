@@ -65,6 +65,11 @@ def scan(splats, values, data="MESH"):
     bpy.context.scene.collection.objects.link(item)
     if data == "POINTCLOUD":
         scenes.activate(item)
+        kinds = bpy.ops.object.convert.get_rna_type().properties["target"].enum_items
+        if "POINTCLOUD" not in kinds:
+            import pytest  # some Blenders that use scans have none
+
+            pytest.skip("this Blender makes no point clouds of meshes")
         bpy.ops.object.convert(target="POINTCLOUD")
         item = bpy.context.object
     fixed = scenes.cube_empty((-0.9, 0, 0), (0.15, 0.4, 0.4), "Fixed")

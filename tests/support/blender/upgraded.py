@@ -34,3 +34,4 @@ def main(order):
 
 if __name__ == "__main__":
     main(sys.argv[1])
+    installed.leave()

@@ -57,7 +57,8 @@ def main():
     os.dup2(2, 1)  # Blender's output must not mix with the answers
     bpy.ops.wm.read_factory_settings(use_empty=True)
     # PyPI's bpy leaves out of the path what Blender itself has there, such as USD.
-    sys.path.extend(map(str, Path(bpy.__file__).parent.glob("*/python/lib/python*/site-packages")))
+    own = Path(bpy.utils.resource_path("LOCAL")) / "python/lib"
+    sys.path.extend(map(str, own.glob("python*/site-packages")))
     for line in sys.stdin:
         print(json.dumps(run(json.loads(line))), file=answers, flush=True)
     # At the end of the process threads of Blender's may deadlock, under Wine also in _exit.
