@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..blender import modifier_stack
+from ..blender import modifier_stack, references
 from ..blender.language import translated
-from ..blender.object_references import source_of
+from ..blender.object_references import settings_of, source_of
 from ..blender.property_definitions import choice
 from ..blender.source_operator import ReportingOperator, SourceOperator
 from ..core.errors import UserError, refuse
@@ -44,12 +44,14 @@ class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
         if sessions.is_live(source, self.kind):
             sessions.end(context, source)
             return {"FINISHED"}
-        earlier = sessions.live.get(source.session_uid)
+        earlier, was_live = sessions.live.get(source.session_uid), settings_of(source).live_kind
         try:
             self.start(context, source, wait)
         except (UserError, ValueError) as error:
             if earlier is not None and not sessions.is_live(source):
                 sessions.go_back(context, source, earlier.former, earlier.kind)
+            if was_live and not settings_of(source).live_kind:  # it cannot go on
+                references.push("Live")
             return self.refuse(error)
         return {"FINISHED"}
 

@@ -112,6 +112,7 @@ def begin(context, source, kind="DEFORM", keeps_shape=False, way=None):
     earlier, session = live.part_with(source.session_uid), None
     returned = None if earlier else live.returning.pop(source.session_uid, None)
     former = earlier.former if earlier else returned
+    waits = source.session_uid in live.paused
     live.paused.discard(source.session_uid)
     if former is None or settings_of(source).live_kind != kind:
         settings_of(source).held = ""
@@ -129,6 +130,7 @@ def begin(context, source, kind="DEFORM", keeps_shape=False, way=None):
             take_away(session or earlier)
         else:
             layers.put_back(context, source, way)
+            live.paused |= {source.session_uid} if waits else set()
         raise
     finally:
         live.begun = None

@@ -22,6 +22,7 @@ if IN_BLENDER:
     from support.blender.stages import watched
 
     from addon.blender import mesh_arrays, modifier_stack, references
+    from addon.core.errors import UserError
     from addon.core.geometry import spaces
     from addon.core.runtime import jobs
     from addon.core.runtime.jobs import run_to_completion
@@ -336,6 +337,22 @@ def test_a_failed_run_that_ends_a_waiting_live_state_is_a_step_of_undo():
     with pytest.raises(RuntimeError, match="No part of the surface"):
         bpy.ops.arapfields.deform(**scenes.QUICK)
     assert not bar.arapfields.live_kind and references.pushed == pushed + 1
+    bar.arapfields.live_kind = "DEFORM"
+    sessions.live.paused.add(bar.session_uid)
+    with pytest.raises(RuntimeError, match="No part of the surface"):
+        bpy.ops.arapfields.live()
+    assert not bar.arapfields.live_kind and references.pushed == pushed + 2
+
+
+def test_a_refused_start_leaves_a_live_state_waiting():
+    bar = scenes.bar()
+    bar.data.clear_geometry()
+    bar.arapfields.live_kind = "DEFORM"
+    sessions.live.paused.add(bar.session_uid)
+    with pytest.raises(UserError):
+        sessions.begin(bpy.context, bar, "STYLIZE")
+    bpy.context.view_layer.update()
+    assert bar.arapfields.live_kind == "DEFORM" and bar.session_uid in sessions.live.paused
 
 
 @pytest.mark.parametrize("result", ["MODIFIER", "NEW"])
