@@ -34,6 +34,7 @@ from .playback import Playback, scene_frame
 # Detects edits of a live session's source, handles and carried objects; main thread.
 
 STROKE = 0.3  # seconds without new weights after which a brush stroke counts as ended
+CHECKING = 0.02  # share of the time that is spent at most on looking for edits beside live mode's own changes
 
 
 class Updates(NamedTuple):
@@ -68,6 +69,8 @@ class EditWatch:
 
     def __init__(self, reader):
         self.reader, self.may_be_edited, self.may_have_moved, self.edited_at = reader, False, False, 0.0
+        self.may_hide_edit = False  # whether an update was of live mode's own change, and perhaps of an edit
+        self.next_check = 0.0  # when to look for such an edit
         self.world = None  # the source's world matrix at the last check
 
     def note(self, updates):
@@ -78,7 +81,10 @@ class EditWatch:
             return
         has_new_shape = source.data.session_uid in updates.meshes
         if has_new_shape:
-            self.may_be_edited |= source.session_uid not in motion.written
+            if source.session_uid in motion.written:
+                self.may_hide_edit = True
+            else:
+                self.may_be_edited = True
             self.edited_at = time.monotonic()
         items = [item for item in updates.items if item != source or not has_new_shape]
         if self.reader.moves_by_itself and any(may_move(item, source) for item in items):
@@ -88,10 +94,13 @@ class EditWatch:
         """Raises SourceChanged if the mesh or its non-uniform scale has changed; else reads moved points."""
         if not is_animated(source) and self.is_stretched(source):
             raise SourceChanged(source.name)
-        if self.may_be_edited and not self.is_in_stroke(source):
-            self.may_be_edited = False
+        begin = time.monotonic()
+        is_due = self.may_be_edited or (self.may_hide_edit and begin >= self.next_check)
+        if is_due and not self.is_in_stroke(source):
+            self.may_be_edited = self.may_hide_edit = False
             if self.is_edited(context, source):
                 raise SourceChanged(source.name)
+            self.next_check = begin + (time.monotonic() - begin) / CHECKING
         if self.may_have_moved:
             self.may_have_moved = False
             self.reader.read_points(context, source)

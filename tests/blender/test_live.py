@@ -462,6 +462,23 @@ def test_edits_of_a_live_source_are_followed():
     assert np.abs(scenes.world_points(bar) - points).max() < 0.05
 
 
+def test_an_edit_is_followed_that_comes_with_live_modes_own_change():
+    """Both are one update of the dependency graph."""
+    bar, _, moving = scenes.bar_with_handles()
+    bpy.ops.arapfields.live()
+    step(refined=True)
+    moving.location.z += 0.2
+    step(refined=True)
+    session = sessions.live[bar.session_uid]
+    assert bar.session_uid in motion.written
+    points = np.array([vertex.co for vertex in bar.data.vertices])
+    scenes.set_positions(bar.data, points * [1.0, 1.5, 1.0])
+    step()
+    step()
+    assert sessions.live[bar.session_uid] is not session
+    assert np.ptp(local_points(bar)[:, 1]) > 1.3 * np.ptp(points[:, 1])
+
+
 def test_live_waits_while_its_source_is_in_edit_mode():
     bar, _, moving = scenes.bar_with_handles()
     bpy.ops.arapfields.live()
