@@ -141,7 +141,7 @@ def with_handles(bar):
 def styled(stack=(), **further):
     """(a bent bar, its stylized points, its points before)."""
     bar = scenes.bar()
-    bar.data.vertices.foreach_set("co", np.ravel([bend(v.co) for v in bar.data.vertices]))
+    scenes.set_positions(bar.data, np.array([bend(v.co) for v in bar.data.vertices]))
     for kind in stack:
         add_modifier(bar, kind)
     rest = scenes.world_points(bar)
