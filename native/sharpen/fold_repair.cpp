@@ -67,9 +67,9 @@ bool FoldRepair::open_folds(Points& positions) {
 template <class Move>
 void FoldRepair::round(Move&& move) {
   if (folded_.empty()) return;
-  progress_.check();
   Nodes moved;
   for (const std::int32_t t : folded_) {
+    progress_.check();
     const Nodes nodes = move(t);
     moved.insert(moved.end(), nodes.begin(), nodes.end());
   }
@@ -78,25 +78,25 @@ void FoldRepair::round(Move&& move) {
     for (Index i = 0; i < surface_.nodes(); ++i)
       if (kept[i]) moved.push_back(static_cast<std::int32_t>(i));
   }
-  folded_ = folded_after(moved);
+  look_again(moved);
 }
 
-/// Triangles that are folded after these nodes have moved since folded_ was found.
-std::vector<std::int32_t> FoldRepair::folded_after(const Nodes& moved) const {
+/// Finds the triangles that are folded after these nodes have moved.
+void FoldRepair::look_again(const Nodes& moved) {
   Nodes turned = moved;
   for (const std::int32_t i : moved)
     turned.insert(turned.end(), surface_.neighbours().begin() + surface_.first_neighbour()[i],
                   surface_.neighbours().begin() + surface_.first_neighbour()[i + 1]);
   sort_uniquely(turned);
-  std::vector<std::int32_t> near = folded_, result;
+  std::vector<std::int32_t> near = folded_;
   for (const std::int32_t i : turned) {
     rotations_[i] = surface_.rotation(i, positions_);
     surface_.around(i, [&](Index t, int) { near.push_back(static_cast<std::int32_t>(t)); });
   }
   sort_uniquely(near);
+  folded_.clear();
   for (const std::int32_t t : near)
-    if (is_folded(surface_, t, positions_, rotations_)) result.push_back(t);
-  return result;
+    if (is_folded(surface_, t, positions_, rotations_)) folded_.push_back(t);
 }
 
 /// The shape that a triangle gets back: that at the start, or where it is folded there, at rest.

@@ -29,7 +29,7 @@ class FoldRepair {
   template <class Move>
   void round(Move&& move);
   const Points& shape_of(Index triangle) const;
-  std::vector<std::int32_t> folded_after(const Nodes& moved) const;
+  void look_again(const Nodes& moved);
   Nodes nodes_around(Index triangle, int rings, std::vector<std::size_t>* first_of_ring = nullptr) const;
   Nodes close_nodes(Index triangle) const;
   Mat3 turn_of(const Nodes& nodes, const Points& shape) const;
@@ -44,7 +44,7 @@ class FoldRepair {
   const ContactLimits& limits_;
   const Progress& progress_;
   Points positions_;
-  mutable std::vector<Mat3> rotations_;
+  std::vector<Mat3> rotations_;
   std::vector<std::int32_t> folded_;  // triangles, in ascending order
 };
 
