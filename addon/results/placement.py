@@ -59,11 +59,15 @@ def existing(context, source, kind, output):
 
 
 def register(source, kind, output, item):
+    """Notes a result in its source's list. Not in a linked source's, which undo leaves as it is: the list
+    would go on to point to an object that undo has removed, and Blender would crash."""
+    settings_of(item).made_from = source.name
+    if source.library is not None:
+        return
     entries = settings_of(source).results
     earlier = (entry for entry in entries if entry.kind == kind and entry.output == output)
     entry = next(earlier, None) or entries.add()
     entry.kind, entry.output, entry.item = kind, output, item
-    settings_of(item).made_from = source.name
 
 
 def show(context, source, kind, output, mesh, report, select=True):

@@ -292,3 +292,17 @@ def test_a_source_stays_where_its_result_cannot_be_seen(way):
     home.exclude = home.hide_viewport = result.hide_viewport = False
     result.hide_set(False)
     assert scenes.world_points(result)[:, 2].max() > before[:, 2].max() + 0.3
+
+
+def test_a_linked_object_does_not_point_to_its_result():
+    """Undo leaves linked data as it is: a pointer there to what undo removes crashed Blender."""
+    bpy.context.preferences.edit.use_global_undo = True
+    linked = scenes.from_another_file(scenes.bar())[0]
+    scenes.activate(linked)
+    bpy.ops.ed.undo_push(message="linked")
+    assert bpy.ops.arapfields.extract(surface="EXACT", resolution=32) == {"FINISHED"}
+    assert "Bar_implicit" in bpy.data.objects and not linked.arapfields.results
+    bpy.ops.ed.undo_push(message="extracted")
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+    assert "Bar_implicit" not in bpy.data.objects
