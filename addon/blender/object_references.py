@@ -84,6 +84,11 @@ def active_of(context):
     return context.view_layer.objects.active if context.view_layer else None
 
 
+def active_uids(context):
+    """{session_uid} of the active object and of the source whose panel it shows."""
+    return {one.session_uid for one in (source_of(context), active_of(context)) if one is not None}
+
+
 def source_of(context):
     """The object that the panel and the operators work on, or None.
 

@@ -11,7 +11,7 @@ from ..blender.language import about, translated
 from ..blender.object_references import (
     ObjectReference,
     SceneReference,
-    active_of,
+    active_uids,
     is_source,
     owner_of,
     refusal,
@@ -195,7 +195,7 @@ class JobOperator(ModalRun, Guided):
     def coroutine(self, context):
         """Coroutine of the job's main-thread work; returns the operator's result."""
         self.failures, self.warnings, self.successes = [], [], []
-        self.about = {one.session_uid for one in (source_of(context), active_of(context)) if one is not None}
+        self.about = active_uids(context)
         job = jobs.Job(self.title, [], native.library().Task, low_priority=self.in_window)
         jobs.begin(job, start=False)
         try:

@@ -3,7 +3,7 @@ import bpy
 
 from ..blender import modifier_stack
 from ..blender.language import translated
-from ..blender.object_references import active_of, settings_of, source_of
+from ..blender.object_references import active_uids, settings_of, source_of
 from ..blender.point_data import shape_keys_of
 from ..blender.section import Section, wrapped
 from ..core.runtime import jobs
@@ -27,7 +27,7 @@ def remarks(source):
 
 def messages(context):
     """The Messages about what is active, and about no object."""
-    here = {one.session_uid for one in (source_of(context), active_of(context)) if one is not None}
+    here = active_uids(context)
     return [one for one in jobs.board.messages if not one.about or one.about & here]
 
 
