@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 #include <unordered_set>
 
 #include "energies/rotation.h"
@@ -15,18 +16,11 @@ namespace {
 /// between them.
 constexpr std::size_t most_close = 32;
 constexpr double apart = 3.0;
-/// Passes in which what lies around folded triangles is relaxed, a ring more in each; rounds of opening and
-/// of that in each; and sweeps of each of these.
-constexpr int most_rings = 2, openings = 4, relaxations = 2, relaxing_sweeps = 8;
-/// Rings around what is then still folded that go back to their former shape, twice as many each time, at
-/// most.
-constexpr int most_rings_back = 128;
-
-Eigen::RowVector3d mean_of(const std::vector<std::int32_t>& nodes, const Points& shape) {
-  Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
-  for (const std::int32_t node : nodes) sum += shape.row(node);
-  return sum / static_cast<double>(nodes.size());
-}
+/// Rounds that open triangles singly before what lies around them is relaxed; rings of nodes that are
+/// relaxed, twice as many each time, at most; and how often for each.
+constexpr int openings = 4, most_rings = 16, relaxations = 2;
+/// Sweeps over the nodes that are relaxed, for rotations that are fitted anew so often.
+constexpr int fits = 6, relaxing_sweeps = 8;
 
 void sort_uniquely(std::vector<std::int32_t>& list) {
   std::sort(list.begin(), list.end());
@@ -47,21 +41,16 @@ bool FoldRepair::open_folds(Points& positions) {
   for (Index t = 0; t < surface_.triangles(); ++t)
     if (now[t]) folded_.push_back(static_cast<std::int32_t>(t));
 
-  const auto open_singly = [&] {
+  for (int rings = 1; rings <= most_rings && !folded_.empty(); rings *= 2) {
     round([&](Index t) { return move_as_one(t); });
     for (int i = 0; i < openings; ++i) round([&](Index t) { return open(t); });
-  };
-  for (int rings = 1; rings <= most_rings; ++rings) {
-    open_singly();
     for (int i = 0; i < relaxations; ++i) round([&](Index t) { return relax(t, rings); });
   }
-  for (int rings = most_rings; rings <= most_rings_back; rings *= 2) {
-    round([&](Index t) { return set_back(t, rings); });
-    open_singly();
-  }
   positions = positions_;
-  return std::all_of(folded_.begin(), folded_.end(),
-                     [&](std::int32_t t) { return is_folded(surface_, t, start_); });
+  folded_.erase(std::remove_if(folded_.begin(), folded_.end(),
+                               [&](std::int32_t t) { return is_folded(surface_, t, start_); }),
+                folded_.end());
+  return folded_.empty();
 }
 
 template <class Move>
@@ -104,10 +93,8 @@ const Points& FoldRepair::shape_of(Index triangle) const {
   return is_folded(surface_, triangle, start_) ? surface_.rest() : start_;
 }
 
-/// Nodes within that many rings of a triangle, from the inner ones on; `first_of_ring`: of the second one
-/// on, where each begins.
-FoldRepair::Nodes FoldRepair::nodes_around(Index triangle, int rings,
-                                           std::vector<std::size_t>* first_of_ring) const {
+/// Nodes within that many rings of a triangle, from the inner ones on.
+FoldRepair::Nodes FoldRepair::nodes_around(Index triangle, int rings) const {
   Nodes result;
   std::unordered_set<std::int32_t> reached;
   const auto reach = [&](Index t) {
@@ -117,11 +104,9 @@ FoldRepair::Nodes FoldRepair::nodes_around(Index triangle, int rings,
   };
   reach(triangle);
   std::size_t from = 0;
-  for (int ring = 1; ring < rings && from < result.size(); ++ring) {
-    const std::size_t end = result.size();
-    if (first_of_ring) first_of_ring->push_back(end);
-    for (; from < end; ++from) surface_.around(result[from], [&](Index t, int) { reach(t); });
-  }
+  for (int ring = 1; ring < rings; ++ring)
+    for (const std::size_t end = result.size(); from < end; ++from)
+      surface_.around(result[from], [&](Index t, int) { reach(t); });
   return result;
 }
 
@@ -178,7 +163,11 @@ FoldRepair::Nodes FoldRepair::move_as_one(Index triangle) {
     return {};
   const Points& shape = shape_of(triangle);
   const Mat3 turn = turn_of(nodes, shape);
-  const Eigen::RowVector3d before = mean_of(nodes, shape), now = mean_of(nodes, positions_);
+  Eigen::RowVector3d before = Eigen::RowVector3d::Zero(), now = before;
+  for (const std::int32_t i : nodes) {
+    before += shape.row(i) / static_cast<double>(nodes.size());
+    now += positions_.row(i) / static_cast<double>(nodes.size());
+  }
   for (const std::int32_t i : nodes) positions_.row(i) = now + (shape.row(i) - before) * turn.transpose();
   return nodes;
 }
@@ -215,50 +204,33 @@ FoldRepair::Nodes FoldRepair::open(Index t) {
   return {corner(apex)};
 }
 
-/// Gives what is within so many rings of a triangle, turned as one, its former shape, as far as what is
-/// around it lets.
+/// Lets what is within so many rings of a triangle go as far back to its shape at rest as what is around it
+/// lets: first turned as one, then each node by its own rotation.
 FoldRepair::Nodes FoldRepair::relax(Index triangle, int rings) {
-  Nodes nodes = nodes_around(triangle, rings);
-  const Points& shape = shape_of(triangle);
-  const Mat3 turn = turn_of(nodes, shape);
-  for (int sweep = 0; sweep < relaxing_sweeps; ++sweep)
-    for (const std::int32_t i : nodes) {
-      if (held_[i]) continue;
-      Vec3 sum = Vec3::Zero();
-      double weights = 0.0;
-      surface_.edges(i, [&](Index j, double weight) {
-        const Vec3 edge = shape.row(i) - shape.row(j), place = positions_.row(j);
-        sum += weight * (place + turn * edge);
-        weights += weight;
-      });
-      positions_.row(i) = sum / weights;
-    }
-  return nodes;
-}
-
-/// Gives what is around a triangle its former shape, moved as a whole, and the less of it the farther it is,
-/// within so many rings: by distances, which tell tiny triangles from large ones.
-FoldRepair::Nodes FoldRepair::set_back(Index triangle, int rings) {
-  std::vector<std::size_t> first_of_ring;
-  Nodes nodes = nodes_around(triangle, rings + 1, &first_of_ring);
-  Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
-  for (int k = 0; k < 3; ++k) middle += surface_.rest().row(surface_.corners()(triangle, k)) / 3.0;
-  const auto distance = [&](std::int32_t i) { return (surface_.rest().row(i) - middle).norm(); };
-  double radius = INFINITY;  // to the last ring; where a piece ends before it, all goes back
-  if (static_cast<int>(first_of_ring.size()) == rings)
-    for (std::size_t at = first_of_ring.back(); at < nodes.size(); ++at)
-      radius = std::min(radius, distance(nodes[at]));
-  const auto beyond = [&](std::int32_t i) { return distance(i) >= radius; };
-  nodes.erase(std::remove_if(nodes.begin(), nodes.end(), beyond), nodes.end());
-  if (nodes.empty()) return {};
-  const Points& shape = shape_of(triangle);
-  const Mat3 turn = turn_of(nodes, shape);
-  const Eigen::RowVector3d before = mean_of(nodes, shape), now = mean_of(nodes, positions_);
-  for (const std::int32_t i : nodes) {
-    if (held_[i]) continue;
-    const double near = std::min(1.0, 2.0 * (1.0 - distance(i) / radius));
-    const Eigen::RowVector3d place = now + (shape.row(i) - before) * turn.transpose();
-    positions_.row(i) += near * near * (3.0 - 2.0 * near) * (place - positions_.row(i));
+  const Nodes nodes = nodes_around(triangle, rings);
+  const Points& rest = surface_.rest();
+  const Mat3 whole = turn_of(nodes, rest);
+  std::unordered_map<std::int32_t, Mat3> turns;
+  for (const std::int32_t i : nodes) turns[i] = whole;
+  const auto turn_at = [&](Index node, const Mat3& beyond) -> const Mat3& {
+    const auto found = turns.find(static_cast<std::int32_t>(node));
+    return found == turns.end() ? beyond : found->second;
+  };
+  for (int fit = 0; fit < fits; ++fit) {
+    for (int sweep = 0; sweep < relaxing_sweeps; ++sweep)
+      for (const std::int32_t i : nodes) {
+        if (held_[i]) continue;
+        const Mat3& own = turns[i];
+        Vec3 sum = Vec3::Zero();
+        double weights = 0.0;
+        surface_.edges(i, [&](Index j, double weight) {
+          const Vec3 edge = rest.row(i) - rest.row(j), place = positions_.row(j);
+          sum += weight * (place + 0.5 * (own + turn_at(j, own)) * edge);
+          weights += weight;
+        });
+        positions_.row(i) = sum / weights;
+      }
+    for (const std::int32_t i : nodes) turns[i] = turn_of({i}, rest);
   }
   return nodes;
 }

@@ -10,8 +10,8 @@
 namespace arapfields {
 
 /// Opens the triangles of a moved surface that are folded, by moving few nodes: those of tiny triangles as
-/// one body, then one node of a triangle at a time, then what lies around, in more and more rings, towards
-/// the shape before.
+/// one body, then one node of a triangle at a time, then what lies around, in more and more rings, by the
+/// local and global steps of as-rigid-as-possible deformation.
 class FoldRepair {
  public:
   /// `start` (k,3): the shape before; `held` (k): 1 for nodes that stay. All must outlive it.
@@ -21,6 +21,8 @@ class FoldRepair {
   /// Opens what is folded at these positions (k,3). Returns whether no triangle is left that is folded, but
   /// for those that are at the start.
   bool open_folds(Points& positions);
+  /// Those that are left, in ascending order.
+  const std::vector<std::int32_t>& folded() const { return folded_; }
 
  private:
   using Nodes = std::vector<std::int32_t>;
@@ -30,13 +32,12 @@ class FoldRepair {
   void round(Move&& move);
   const Points& shape_of(Index triangle) const;
   void look_again(const Nodes& moved);
-  Nodes nodes_around(Index triangle, int rings, std::vector<std::size_t>* first_of_ring = nullptr) const;
+  Nodes nodes_around(Index triangle, int rings) const;
   Nodes close_nodes(Index triangle) const;
   Mat3 turn_of(const Nodes& nodes, const Points& shape) const;
   Nodes move_as_one(Index triangle);
   Nodes open(Index triangle);
   Nodes relax(Index triangle, int rings);
-  Nodes set_back(Index triangle, int rings);
 
   const WeldedSurface& surface_;
   const Points& start_;

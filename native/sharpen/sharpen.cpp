@@ -34,8 +34,10 @@ constexpr int rings_around = 2;
 constexpr double detail_reach = 0.02, on_detail = 0.85, off_detail = 0.96, detail_weight = 0.1;
 /// Share of the last step by which the next one starts ahead: twelve steps then do as well as sixteen at 0.6.
 constexpr double momentum = 0.8;
+/// Share of the diagonal around folds that cannot be opened, where the surface goes back at first.
+constexpr double first_reach = 0.05;
 /// Residual of a global step's system, relative to that at its start.
-constexpr double solve_tolerance = 0.05;
+constexpr double solve_tolerance = 0.1;
 /// Bytes that a vertex takes with its two triangles, at most.
 constexpr double bytes_per_vertex = 2000.0;
 constexpr Index sharpen_grain = 4096;
@@ -204,10 +206,31 @@ class Finish {
     limits_.keep(positions_);
   }
 
-  /// Opens triangles that are folded. Where that leaves some that are not folded at the start, all goes back
-  /// there.
+  /// Opens triangles that are folded. Around those that cannot be opened and are not folded at the start, the
+  /// surface goes back there, within twice the distance each time.
   void spare_folds() {
-    if (!FoldRepair(surface_, start_, held_, limits_, progress_).open_folds(positions_)) positions_ = start_;
+    FoldRepair repair(surface_, start_, held_, limits_, progress_);
+    const Points finished = positions_;
+    std::vector<Eigen::RowVector3d> places;
+    const double size = diagonal_of(surface_.rest());
+    for (double reach = first_reach * size; !repair.open_folds(positions_); reach *= 2.0) {
+      if (reach > size) {
+        positions_ = start_;
+        return;
+      }
+      for (const std::int32_t t : repair.folded())
+        places.emplace_back(surface_.rest().row(surface_.corners()(t, 0)));
+      parallel_for(0, surface_.nodes(), sharpen_grain, [&](Index begin, Index end) {
+        for (Index i = begin; i < end; ++i) {
+          double nearest = INFINITY;
+          for (const auto& place : places)
+            nearest = std::min(nearest, (surface_.rest().row(i) - place).norm());
+          const double share = std::clamp(2.0 * nearest / reach - 1.0, 0.0, 1.0);
+          positions_.row(i) =
+              start_.row(i) + share * share * (3.0 - 2.0 * share) * (finished.row(i) - start_.row(i));
+        }
+      });
+    }
   }
 
   const Points& positions() const { return positions_; }

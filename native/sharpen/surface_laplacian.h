@@ -11,13 +11,13 @@ namespace arapfields {
 
 /// The constant system of a surface's global steps: Σ of its triangles' edges w (x_i − x_j)², a weight for
 /// each triangle times its cotangents, with some nodes held, and all others bound to places of theirs.
-/// Conjugate gradients solve it from the last positions on. They are preconditioned by groups of nodes at
-/// several scales (Bramble, Pasciak and Xu 1990, "Parallel Multilevel Preconditioners"), of which a sparse
-/// Cholesky factor solves the coarsest: the factor of all nodes takes minutes for half a million of them.
+/// Conjugate gradients solve it from the last positions on. They are preconditioned by cycles over groups of
+/// nodes (Notay 2010, "An aggregation-based algebraic multigrid method"), of which a sparse Cholesky factor
+/// solves the coarsest: the factor of all nodes takes minutes for half a million of them.
 class SurfaceLaplacian {
  public:
   /// `factors` (m') of the triangles; `held` (k) 1 for nodes that stay; `bound` (k) weights that bind nodes
-  /// to their places, or empty: weak ones. `surface` must outlive it.
+  /// to their places, or empty: weak ones.
   SurfaceLaplacian(const WeldedSurface& surface, const Vector& factors, const std::vector<char>& held,
                    const Progress& progress, const Vector& bound = {});
 
@@ -30,28 +30,44 @@ class SurfaceLaplacian {
   void solve_further(const Points& solution, const std::vector<char>& still, double tolerance, Points& x);
 
  private:
-  /// Groups of the nodes of the level before.
+  /// A symmetric matrix, as its diagonal and the neighbours of each row with their weights: entries of the
+  /// other sign.
+  struct Matrix {
+    std::vector<std::int32_t> first = {0}, neighbour;
+    std::vector<double> weight;
+    Vector diagonal, inverse_diagonal;
+    std::vector<char> held;  // rows that are no unknowns
+    Index size() const { return static_cast<Index>(first.size()) - 1; }
+    Eigen::RowVector3d times(const Points& x, Index row) const {
+      Eigen::RowVector3d sum = diagonal[row] * x.row(row);
+      for (std::int32_t at = first[row]; at < first[row + 1]; ++at) sum -= weight[at] * x.row(neighbour[at]);
+      return sum;
+    }
+  };
+  /// A scale: its matrix, and the groups of its nodes, which are the nodes of the next one.
   struct Level {
-    std::vector<std::int32_t> group_of;  // of each node there
+    Matrix matrix;
+    std::vector<std::int32_t> group_of;  // of each node
     std::vector<std::int32_t> first;     // of each group in `members`, and the end
     std::vector<std::int32_t> members;   // nodes of the groups
-    Vector inverse_diagonal;             // of the groups' matrix; of the coarsest, unused
-    Points sums, correction;             // of the groups, while it preconditions
+    // Of its nodes, while it solves: the residual, a cycle's result before and after the last smoothing, the
+    // direction and its image, and the sum of the steps.
+    Points residual, smoothed, solution, direction, image, sum;
   };
-  /// Both return the sum of the products of their two entries.
-  double multiply(const Points& x, Points& product) const;
-  double precondition(const Points& residual, Points& step);
+  static std::vector<std::int32_t> groups_of(const Matrix& matrix, Index& count);
+  static Matrix grouped(const Level& level, Index count);
+
+  bool is_still(std::size_t level, Index node) const { return level == 0 && still_[node]; }
+  /// Returns x · product.
+  double multiply(std::size_t level, const Points& x, Points& product) const;
+  void cycle(std::size_t level);
+  void conjugate_gradients(std::size_t level, int most, double tolerance);
   void reduce_residual(double tolerance, Points& x);
 
-  const WeldedSurface& surface_;
-  std::vector<double> weight_;  // of the surface's edges
-  Vector diagonal_;
-  Vector inverse_diagonal_;
-  Vector bound_;  // weights that bind nodes to their places
   std::vector<char> held_, still_;
-  std::vector<Level> levels_;
+  Vector bound_;               // weights that bind nodes to their places
+  std::vector<Level> levels_;  // the last one's matrix has a factor, and no groups
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> coarsest_;
-  Points residual_, step_, direction_, image_;  // while it solves
 };
 
 }  // namespace arapfields

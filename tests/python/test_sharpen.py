@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from support.geometry.meshes import box, sphere, subdivide, suzanne, torus
+from support.geometry.meshes import box, read, sphere, subdivide, suzanne, torus
 from support.tasks import cancelled_when
 
 import arapfields as af
@@ -167,6 +167,17 @@ def test_tiny_triangles_stay_open_and_the_finish_is_kept(seed):
     assert len(af.folded_triangles(*tiny, sharpened)) == 0
     gain = angle_to_style(vertices, triangles) - angle_to_style(without, triangles)
     assert angle_to_style(*tiny) - angle_to_style(sharpened, tiny[1]) > 0.9 * gain
+
+
+def test_one_triangle_that_stays_folded_does_not_take_the_finish_back(data_dir):
+    """What has the style of a cube gets that of a tetrahedron: many triangles turn far, and some fold."""
+    vertices, triangles = read(data_dir / "meshes" / "rockerArm.obj")
+    cube = af.sharpen(vertices, triangles, vertices, "cube")
+    sharpened = af.sharpen(vertices, triangles, cube, "tetrahedron")
+    assert len(af.folded_triangles(vertices, triangles, sharpened)) == 0
+    preferred = af.preferred_normals("tetrahedron")
+    angles = [angle_to_style(each, triangles, preferred) for each in (cube, sharpened)]
+    assert angles[1] < 0.3 * angles[0]
 
 
 @pytest.mark.parametrize("style", ["cube", "octahedron"])
