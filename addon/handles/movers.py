@@ -6,9 +6,9 @@ import numpy as np
 from mathutils import Matrix
 
 from ..blender.evaluation import is_disabled, is_moved, with_ancestors, world_matrix
-from ..blender.object_references import in_scene, settings_of
+from ..blender.object_references import holds_by, in_scene, settings_of
 from ..blender.property_definitions import listeners
-from ..blender.references import parts_of, references
+from ..blender.references import parts_of, references, takes_references
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix
 from ..core.geometry.spaces import inverse
@@ -103,6 +103,8 @@ def put_in_world(entry, is_held):
     """Has a handle stay in the world, or move with its object."""
     if entry.kind == "BONE" or entry.empty is None or is_held == in_world(entry):
         return
+    if not takes_references(entry.empty):
+        return
     if entry.empty.parent is not None:
         detach(entry.empty)
     if not is_held:
@@ -177,7 +179,7 @@ def owner_elsewhere(entry):
     owner = settings_of(entry.empty).handle_of
     if owner in (None, entry.id_data) or not in_scene(owner):
         return None
-    return owner if any(one.empty == entry.empty for one in settings_of(owner).handles) else None
+    return owner if holds_by(owner, entry.empty) else None
 
 
 def is_copied(entry):

@@ -175,12 +175,23 @@ def dangling():
         named = [("data", item.data), ("parent", item.parent)]
         for modifier in item.modifiers:
             named += [(f"{modifier.name}: {path}", value) for path, value in references.references(modifier)]
-        settings = settings_of(item)
-        for group in (settings.handles, settings.results, settings.carried):
-            named += [
-                (one.path_from_id(), getattr(one, "empty", getattr(one, "item", None))) for one in group
-            ]
+        named += pointers(settings_of(item))
         found += [(item.name, path) for path, value in named if value is not None and is_gone(value, there)]
+    return found
+
+
+def pointers(group):
+    """[(path, data-block)] of all pointers of a group of settings, of the groups within it and their lists."""
+    found = []
+    for one in group.bl_rna.properties:
+        if one.type == "COLLECTION":
+            found += [each for entry in getattr(group, one.identifier) for each in pointers(entry)]
+        elif one.type == "POINTER" and one.identifier != "rna_type":
+            value = getattr(group, one.identifier)
+            if isinstance(value, bpy.types.PropertyGroup):
+                found += pointers(value)
+            elif value is not None:
+                found.append((f"{group.path_from_id()}.{one.identifier}", value))
     return found
 
 
