@@ -174,23 +174,21 @@ def bone_box(bone):
     return box
 
 
-def owner_elsewhere(entry):
-    """The other object that owns an entry's Empty, or None: duplicates of a source have the same Empties."""
+def is_own(entry):
+    """Whether no other object owns an entry's Empty: duplicates of a source have the same Empties."""
     owner = settings_of(entry.empty).handle_of
-    if owner in (None, entry.id_data) or not in_scene(owner):
-        return None
-    return owner if holds_by(owner, entry.empty) else None
+    return owner in (None, entry.id_data) or not in_scene(owner) or not holds_by(owner, entry.empty)
 
 
 def is_copied(entry):
     """Whether an entry came with a duplicate of its object, and its Empty is the first's: it is no handle
     until the first is deleted."""
-    return entry.kind != "BONE" and in_scene(entry.empty) and owner_elsewhere(entry) is not None
+    return entry.kind != "BONE" and in_scene(entry.empty) and not is_own(entry)
 
 
 def has_mover(entry):
     if entry.kind != "BONE":
-        return in_scene(entry.empty) and owner_elsewhere(entry) is None
+        return in_scene(entry.empty) and is_own(entry)
     return in_scene(entry.rig) and entry.rig.pose is not None and bone_of(entry) in entry.rig.pose.bones
 
 

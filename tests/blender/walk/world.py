@@ -181,7 +181,7 @@ def dangling():
 
 
 def pointers(group):
-    """[(path, data-block)] of all pointers of a group of settings, of the groups within it and their lists."""
+    """[(path, data-block)] of all pointers in a group of settings, in its groups and lists."""
     found = []
     for one in group.bl_rna.properties:
         if one.type == "COLLECTION":

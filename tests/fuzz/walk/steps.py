@@ -225,21 +225,10 @@ MODES = ("EDIT", "SCULPT", "WEIGHT_PAINT", "VERTEX_PAINT")
 # What needs a window, a file of its own, or ends the walk's scene.
 LEFT_OUT = {"pin_tool", "pin_hover", "pin_drag", "click_landmarks", "cancel", "clear_cache", "wrap_sequence"}
 LEFT_OUT |= {"export_animation", "bake", "open_log", "check"}
-LARGE = (
-    "iterations",
-    "samples",
-    "width",
-    "layers",
-    "batch",
-    "centers",
-    "stages",
-    "resolution",
-    "octaves",
-    "points",
-)
-LARGE += ("threads", "device", "subframes", "seed", "start", "end", "step", "seconds", "memory", "size")
-LARGE += ("quality",)  # that of a fit stands for large values of others
-LARGE += ("share",)  # subdivide divides a mesh into millions of faces by a small one
+# Large values of these take long: a fit's quality stands for others, a small share divides into many faces.
+LARGE = ("iterations", "samples", "width", "layers", "batch", "centers", "stages", "resolution", "octaves")
+LARGE += ("points", "threads", "device", "subframes", "seed", "start", "end", "step", "seconds", "memory")
+LARGE += ("size", "quality", "share")
 GROUPS = ("deform", "stylize", "wrap", "stiffness", "secondary", "contact", "bake", "skin", "fit", "pin")
 
 
