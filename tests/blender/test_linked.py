@@ -13,7 +13,7 @@ if IN_BLENDER:
     from support.blender.stacks import QUICK, STYLE, structure, styled, with_handles
 
     from addon.blender.object_references import owner_of, source_of
-    from addon.field_modifier import layers
+    from addon.field_modifier import cache_modifier, layers
     from addon.handles import empties
     from addon.pin_tool import pins
     from addon.wrap import landmarks
@@ -156,3 +156,17 @@ def test_a_layer_of_a_linked_object_stays_where_something_is_transferred():
     scenes.activate(bar)
     assert bpy.ops.arapfields.transfer(onto="Scan", transfer={"GROUPS"}) == {"FINISHED"}
     assert structure(bar)[:4] == before
+
+
+@pytest.mark.parametrize("kind", ["PC2", "KEYS"])
+def test_a_bake_leaves_a_linked_object_as_it_is(tmp_path, kind):
+    """A modifier there would be gone once the file is opened again; a new object plays the frames."""
+    scenes.bar_with_handles()
+    ends = [entry.empty for entry in bpy.data.objects["Bar"].arapfields.handles]
+    bar = scenes.from_another_file(bpy.data.objects["Bar"], *ends)[0]
+    scenes.activate(bar)
+    given = {"folder": str(tmp_path), "format": kind, "range": "CUSTOM", "start": 1, "end": 2}
+    assert bpy.ops.arapfields.bake(**given) == {"FINISHED"}
+    made = bpy.context.object
+    assert not bar.modifiers and made != bar and len(made.data.vertices) == len(bar.data.vertices)
+    assert cache_modifier.is_playing(made) if kind == "PC2" else made.data.shape_keys is not None
