@@ -165,6 +165,17 @@ def test_what_cannot_take_anything_is_named_and_kept():
     assert scenes.everything(target) == kept
 
 
+def test_a_target_without_room_for_uv_maps_receives_nothing():
+    _, target, _ = wrapped_bar()
+    for number in range(8):  # as many as a mesh can have
+        target.data.uv_layers.new(name=f"Own {number}")
+    kept, names = scenes.everything(target), target.vertex_groups.keys()
+    with pytest.raises(RuntimeError, match="Other has no room for another UV map"):
+        bpy.ops.arapfields.transfer(transfer={"KEYS", "GROUPS", "ATTRIBUTES", "UV_MAPS"})
+    assert scenes.everything(target) == kept and target.vertex_groups.keys() == names
+    assert target.data.shape_keys is None
+
+
 def test_a_refused_transfer_leaves_the_wrap_a_layer():
     """As it is where the user has removed the modifier of a deformation on it."""
     item, _, _ = wrapped_bar()
