@@ -33,9 +33,10 @@ def small(item):
     settings = settings_of(item)
     for group, values in SMALL.items():
         for name, value in values.items():
-            if hasattr(getattr(settings, group), name):
+            if getattr(getattr(settings, group), name, value) != value:
                 setattr(getattr(settings, group), name, value)
-    settings.resolution = 12
+    if settings.resolution != 12:
+        settings.resolution = 12
 
 
 def begin_file():

@@ -257,10 +257,12 @@ class AllSteps(Undoing):
             return self.add() if name == "add" else None
         self.source = items[self.rng.integers(len(items))]
         self.old = self.source.name
-        if self.source.library is None:
-            world.small(self.source)  # it may be a result, which has settings of its own
         scenes.activate(self.source)
-        return getattr(self, name)()
+        said = getattr(self, name)()
+        for item in world.sources():  # within the step: a refused one changes nothing
+            if item.library is None:
+                world.small(item)  # a result has settings of its own, a preset others
+        return said
 
     @property
     def settings(self):
