@@ -56,11 +56,11 @@ def owner_of(item):
     settings = settings_of(item)
     owner = settings.handle_of or (maker_of(item, settings.made_from) if settings.made_from else None)
     if owner is None and item.type == "EMPTY" and not takes_references(item):
-        owner = next((one for one in bpy.data.objects if holds_by(one, item)), None)
+        owner = next((one for one in bpy.data.objects if has_handle(one, item)), None)
     return owner if in_scene(owner) else None
 
 
-def holds_by(source, empty):
+def has_handle(source, empty):
     """Whether an Empty is in the source's list of handles."""
     return any(entry.empty == empty for entry in settings_of(source).handles)
 

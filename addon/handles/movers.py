@@ -6,7 +6,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..blender.evaluation import is_disabled, is_moved, with_ancestors, world_matrix
-from ..blender.object_references import holds_by, in_scene, settings_of
+from ..blender.object_references import has_handle, in_scene, settings_of
 from ..blender.property_definitions import listeners
 from ..blender.references import parts_of, references, takes_references
 from ..core.errors import UserError
@@ -177,7 +177,7 @@ def bone_box(bone):
 def is_own(entry):
     """Whether no other object owns an entry's Empty: duplicates of a source have the same Empties."""
     owner = settings_of(entry.empty).handle_of
-    return owner in (None, entry.id_data) or not in_scene(owner) or not holds_by(owner, entry.empty)
+    return owner in (None, entry.id_data) or not in_scene(owner) or not has_handle(owner, entry.empty)
 
 
 def is_copied(entry):
