@@ -273,11 +273,15 @@ def strays():
 
 
 def settle():
-    """As the timer does, until every shape is as good as it gets."""
+    """As the timer does, until every shape is as good as it gets. One that swings without damping never
+    rests: it is not waited for."""
     for _ in range(5):
         before = dict(sessions.live)
         bpy.context.view_layer.update()
-        sessions.update(bpy.context, wait=WAIT, refined=True)
+        sessions.update(bpy.context)
+        rests = {uid: not session.has_motion for uid, session in sessions.live.items()}
+        if any([sessions.update_one(bpy.context, uid, WAIT, rests[uid]) for uid in rests]):
+            references.push("Live")
         if before == sessions.live:  # no solver was set up anew
             break
     bpy.context.view_layer.update()
