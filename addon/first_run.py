@@ -16,9 +16,11 @@ from .core.runtime import native
 
 # Says once, when the extension is first enabled, where it is to be found.
 #
-# The text is in the 3D views for a while, where it takes no key and hides behind no window.
+# The text is in the 3D views for a while, where it takes no key and hides behind no window. The while begins
+# when the Preferences are closed, where the extension was installed.
 
 SECONDS = 40.0
+INTERVAL = 0.5  # seconds between looks at the windows
 SIZE, LEFT, BOTTOM = 14, 90, 40  # of the text and its place in a 3D view, in pixels at UI scale 1
 
 
@@ -44,12 +46,23 @@ def show():
     stored.was_welcomed = bpy.context.preferences.is_dirty = True  # else Blender would not save it
     welcome.until = time.monotonic() + SECONDS
     redraw(bpy.context, "WINDOW")
-    host.start(end, first=SECONDS + 0.1)
+    host.start(end, first=INTERVAL)
 
 
 def end():
     """Timer callback."""
+    if are_preferences_open():
+        welcome.until = time.monotonic() + SECONDS
+    if welcome.until > time.monotonic():
+        return INTERVAL
     redraw(bpy.context, "WINDOW")
+    return None
+
+
+def are_preferences_open():
+    """Whether there is a window of the Preferences."""
+    screens = [window.screen for window in bpy.context.window_manager.windows]
+    return any(s.is_temporary and any(a.type == "PREFERENCES" for a in s.areas) for s in screens)
 
 
 def lines():

@@ -13,6 +13,7 @@ from ..blender import mesh_arrays
 from ..blender.evaluation import varies
 from ..blender.language import translated
 from ..blender.object_references import settings_of
+from ..blender.references import takes_references
 from ..core.errors import UserError, as_user_error
 from ..field_modifier import layers
 from ..handles import empties
@@ -160,7 +161,8 @@ class ObjectBake:
 
     def __init__(self, context, source, kind, frames, path=None, part=None, loop=False):
         settings, fps = settings_of(source), secondary_motion.frame_rate(context.scene)
-        self.in_place = placement.in_place(settings.output, settings.result) and path is not None
+        is_in_place = placement.in_place(settings.output, settings.result) and path is not None
+        self.in_place = is_in_place and takes_references(source)  # a linked object would lose its modifier
         self.poses, self.reader = Poses(), SourceReader(context, source, kind, self.in_place)
         if not self.in_place and settings.output == "WARP":  # unlike live mode, a bake needs all
             self.reader.moves_by_itself = has_motion_before(source, in_place=False)

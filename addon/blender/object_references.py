@@ -7,6 +7,7 @@ import bpy
 
 from ..core.errors import UserError
 from ..names import PROPERTY
+from .references import takes_references
 from .splat_layouts import holds_splats
 
 # References to objects and scenes across ticks of a job, by session_uid: Python's become invalid.
@@ -54,7 +55,14 @@ def owner_of(item):
     """The source of a handle or a result; None for others, or if the source was deleted."""
     settings = settings_of(item)
     owner = settings.handle_of or (maker_of(item, settings.made_from) if settings.made_from else None)
+    if owner is None and item.type == "EMPTY" and not takes_references(item):
+        owner = next((one for one in bpy.data.objects if has_handle(one, item)), None)
     return owner if in_scene(owner) else None
+
+
+def has_handle(source, empty):
+    """Whether an Empty is in the source's list of handles."""
+    return any(entry.empty == empty for entry in settings_of(source).handles)
 
 
 def maker_of(item, name):

@@ -55,6 +55,12 @@ def refuse_new(source):
         raise UserError("{name} needs new data for its motion; start again", source)
 
 
+def takes_references(block):
+    """Whether a data-block can be given references to others of the file. A linked one cannot: undo leaves it
+    as it is, with references to what undo has removed, and Blender crashes."""
+    return block.library is None
+
+
 # References of a data-block to others, and the removal of objects and modifiers with what becomes unused.
 
 # References of a data-block to others: by modifiers with their inputs of nodes, constraints and drivers.

@@ -15,7 +15,7 @@ from ..blender.language import about, translated
 from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import effective_value
 from ..carried.carrying import Carrying
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.geometry.spaces import inverse, similarity, transform
 from ..core.poses import Pose
 from ..core.runtime import native
@@ -145,10 +145,9 @@ def plan_solve_job(
     """
     settings = settings_of(source)
     output, result = destination(settings, operator)
-    reason = placement.refusal(source, output, result)
-    if reason is not None:
-        raise reason
+    refuse(placement.refusal(source, output, result))
     operator.end_live(context, source, kind)
+    refuse(placement.refusal(source, output, result))  # of the stack with the result below as a layer
     exact = effective_value("surface", settings, operator) == "EXACT"
     extraction = {name: effective_value(name, settings, operator) for name in ("resolution", "refine_thin")}
     carrying, in_place = Carrying(context, source), placement.in_place(output, result)
@@ -209,9 +208,9 @@ def plan_solve_job(
         owner = surface.reference.get()
         if kind == "DEFORM":
             settings_of(owner).long_triangles = solved.report.get("turned_triangles", 0)
+        item = placement.place_result(bpy.context, owner, kind, output, result, solved, placed.local)
         if result != "NEW":
             operator.ways = tuple(one for one in operator.ways if one[0].uid != surface.reference.uid)
-        item = placement.place_result(bpy.context, owner, kind, output, result, solved, placed.local)
         if preview is not None:
             preview.keep()
         if solved.place is not None:

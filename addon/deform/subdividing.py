@@ -44,7 +44,6 @@ class ARAPFIELDS_OT_subdivide(SourceOperator, bpy.types.Operator):
 
     def change(self, context, source):
         longest = np.ptp(mesh_arrays.positions(source.data), axis=0).max(initial=0.0)
-        placement.single_user(source)
         before = len(source.data.vertices)
         divide(source, self.share * longest)
         settings_of(source).long_triangles = 0
@@ -70,6 +69,7 @@ def divide(source, limit):
             made = bmesh.ops.subdivide_edges(shape, edges=long, cuts=1, use_grid_fill=True)["geom"]
             wide = [one for one in made if isinstance(one, bmesh.types.BMFace) and len(one.verts) > 4]
             bmesh.ops.triangulate(shape, faces=wide)
+        placement.single_user(source)
         shape.to_mesh(source.data)
     finally:
         shape.free()

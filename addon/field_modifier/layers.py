@@ -11,6 +11,7 @@ from ..blender import mesh_arrays, modifier_stack, references
 from ..blender.evaluation import varies
 from ..blender.language import translated
 from ..blender.object_references import settings_of
+from ..blender.references import takes_references
 from ..blender.splat_layouts import holds_splats
 from ..core.errors import UserError
 from ..core.runtime import jobs
@@ -124,8 +125,10 @@ NOTHING = Way()
 
 def make_way(source, kind):
     """Called before a run reads its shape: makes the result that it acts on a layer, or removes those above.
-    Returns the Way, for put_back() if the run fails."""
+    Those of a linked object stay. Returns the Way, for put_back() if the run fails."""
     gone = []
+    if not takes_references(source):
+        return NOTHING
     if stays_below(source, kind):
         cover(source)
         return Way(is_covered=True)
@@ -220,11 +223,11 @@ def cover(source):
 
 def uncover(source, baked=False):
     """Turns the last layer into the field's modifier, unless there is one, or a bake's modifier and not
-    `baked`."""
+    `baked`; returns whether it has."""
     layers = modifier_stack.layers(source)
     owned = modifier_stack.find(source) or (None if baked else modifier_stack.find_cache(source))
-    if not layers or owned is not None or source.mode == "EDIT":
-        return
+    if not layers or owned is not None or source.mode == "EDIT" or not takes_references(source):
+        return False
     layer = layers[-1]
     kind, number, normals = parts(layer)
     mesh = motion.carrier(source, layer)
@@ -241,6 +244,7 @@ def uncover(source, baked=False):
     behind = list(source.modifiers)[list(source.modifiers).index(layer) :]
     settings_of(source).under_rig = kind == "WRAP" and any(one.type == "ARMATURE" for one in behind)
     settings_of(source).moved_by = kind
+    return True
 
 
 def rename(modifier, old, new):

@@ -10,9 +10,10 @@ from mathutils import Matrix, Vector
 from ..blender import former_defaults, mesh_arrays, modifier_stack, vertex_groups
 from ..blender.evaluation import is_driven
 from ..blender.language import translated
-from ..blender.object_references import choose_row, in_scene, owner_of, settings_of
+from ..blender.object_references import choose_row, in_scene, owner_of, refusal_of_linked, settings_of
 from ..blender.point_data import selection_of
 from ..blender.property_definitions import from_single_precision
+from ..blender.references import takes_references
 from ..core.errors import UserError, refuse
 from ..core.geometry.handles import far_handle, solve_handle
 from ..core.geometry.spaces import Space, inverse, space_of, transform
@@ -247,23 +248,31 @@ PINS = ("PIN", "POINT")  # these hold location and rotation, and location only
 SHAPES = {"CUBE": "CUBE", "POINT": "SPHERE", "GROUP": "ARROWS", "PIN": "SPHERE"}
 
 
-def add(source, empty, kind="CUBE"):
-    """Makes an Empty a handle of the source, with its present pose as rest pose; resets an existing one."""
+def require_fit(source, empty):
+    """Raises UserError if an Empty cannot be a handle of the source."""
     if empty.empty_display_type == "IMAGE":
         raise UserError("{name} shows an image; take another kind of Empty", empty)
-    space_of(matrix_of(source), source.name)
     if abs(np.linalg.det(current_box(empty)[:3, :3])) == 0:
         raise UserError("{name} is flat; give it a size and a scale other than zero", empty)
+    if owner_of(empty) not in (None, source):  # a handle of this file is taken over
+        refuse(refusal_of_linked(empty))
+
+
+def add(source, empty, kind="CUBE"):
+    """Makes an Empty a handle of the source, with its present pose as rest pose; resets an existing one."""
+    require_fit(source, empty)
+    space_of(matrix_of(source), source.name)
     settings = settings_of(source)
     owner = settings_of(empty).handle_of
     if owner is not None and owner != source and find(owner, empty) >= 0:  # a duplicate of a handle is none
         remove(owner, find(owner, empty))
     entry = choose_or_add(settings, find(source, empty))
     entry.empty, entry.kind, entry.rig, entry.bone = empty, kind, None, ""
-    settings_of(empty).handle_of = source
-    if empty.parent is None and empty.library is None and not is_driven(empty):
-        movers.attach(empty, source)
-    empty.empty_display_type = SHAPES[kind]
+    if takes_references(empty):
+        settings_of(empty).handle_of = source
+        empty.empty_display_type = SHAPES[kind]
+        if empty.parent is None and not is_driven(empty):
+            movers.attach(empty, source)
     store_rest(source, entry)
     return entry
 
@@ -293,6 +302,8 @@ def make_empty(context, source, matrix, size, name):
 def home_of(context, source):
     """The collection of handles within that of the source; made if there is none."""
     around = next((c for c in source.users_collection if c in editable(context)), context.collection)
+    if not takes_references(around):
+        around = context.scene.collection
     home = next((one for one in around.children if one.get(HANDLES_MARK) and one.library is None), None)
     if home is None:
         home = bpy.data.collections.new(HANDLES)

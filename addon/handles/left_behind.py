@@ -10,6 +10,7 @@ from ..blender.host import has_window
 from ..blender.language import translated
 from ..blender.object_references import in_scene, settings_of
 from ..blender.property_definitions import text
+from ..blender.references import takes_references
 from ..blender.source_operator import ReportingOperator
 from ..names import Op
 from . import empties
@@ -20,8 +21,13 @@ seen = {}  # "count": number of objects in the view layer at the last check
 def of_deleted():
     """{source in no scene: Empties of its handles that are in a scene}."""
     gone = [item for item in bpy.data.objects if settings_of(item).handles and not in_scene(item)]
-    left = {source: [e.empty for e in empties.used(source) if e.kind != "BONE"] for source in gone}
+    left = {source: [e.empty for e in empties.used(source) if is_ours(e)] for source in gone}
     return {source: items for source, items in left.items() if items}
+
+
+def is_ours(entry):
+    """Whether a handle has an Empty of this file."""
+    return entry.kind != "BONE" and takes_references(entry.empty)
 
 
 def follow(context):

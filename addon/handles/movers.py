@@ -6,9 +6,9 @@ import numpy as np
 from mathutils import Matrix
 
 from ..blender.evaluation import is_disabled, is_moved, with_ancestors, world_matrix
-from ..blender.object_references import in_scene, settings_of
+from ..blender.object_references import has_handle, in_scene, settings_of
 from ..blender.property_definitions import listeners
-from ..blender.references import parts_of, references
+from ..blender.references import parts_of, references, takes_references
 from ..core.errors import UserError
 from ..core.geometry.handles import box_matrix
 from ..core.geometry.spaces import inverse
@@ -103,6 +103,8 @@ def put_in_world(entry, is_held):
     """Has a handle stay in the world, or move with its object."""
     if entry.kind == "BONE" or entry.empty is None or is_held == in_world(entry):
         return
+    if not takes_references(entry.empty):
+        return
     if entry.empty.parent is not None:
         detach(entry.empty)
     if not is_held:
@@ -172,23 +174,21 @@ def bone_box(bone):
     return box
 
 
-def owner_elsewhere(entry):
-    """The other object that owns an entry's Empty, or None: duplicates of a source have the same Empties."""
+def is_own(entry):
+    """Whether no other object owns an entry's Empty: duplicates of a source have the same Empties."""
     owner = settings_of(entry.empty).handle_of
-    if owner in (None, entry.id_data) or not in_scene(owner):
-        return None
-    return owner if any(one.empty == entry.empty for one in settings_of(owner).handles) else None
+    return owner in (None, entry.id_data) or not in_scene(owner) or not has_handle(owner, entry.empty)
 
 
 def is_copied(entry):
     """Whether an entry came with a duplicate of its object, and its Empty is the first's: it is no handle
     until the first is deleted."""
-    return entry.kind != "BONE" and in_scene(entry.empty) and owner_elsewhere(entry) is not None
+    return entry.kind != "BONE" and in_scene(entry.empty) and not is_own(entry)
 
 
 def has_mover(entry):
     if entry.kind != "BONE":
-        return in_scene(entry.empty) and owner_elsewhere(entry) is None
+        return in_scene(entry.empty) and is_own(entry)
     return in_scene(entry.rig) and entry.rig.pose is not None and bone_of(entry) in entry.rig.pose.bones
 
 

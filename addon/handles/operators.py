@@ -5,9 +5,11 @@ from ..blender import vertex_groups
 from ..blender.language import translated
 from ..blender.object_references import select_alone, settings_of, source_of
 from ..blender.property_definitions import choice, flag, text
+from ..blender.references import takes_references
 from ..blender.source_operator import SourceOperator
 from ..core.errors import UserError
 from ..core.geometry.handles import nothing_held
+from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.choices import BONES, EMPTY_KINDS, HANDLE_PLACES
 from ..field_modifier import layers
@@ -74,12 +76,15 @@ class ARAPFIELDS_OT_add_handle(HandleOperator, bpy.types.Operator):
             raise vertex_groups.none_chosen(source)
         selected = [item for item in context.selected_objects if item.type == "EMPTY"]
         is_new = not selected or self.place != "AUTO" or source.mode == "EDIT"
+        space_of(movers.matrix_of(source), source.name)
+        for empty in () if is_new else selected:
+            empties.require_fit(source, empty)
         with layers.way_for_handle(context, source):
             if is_new:
                 selected = [empties.new_empty(context, source, self.kind, group, self.place)]
         others = {settings_of(empty).handle_of for empty in selected} - {None, source}
         for empty in selected:
-            if empties.is_blenders_own(empty):
+            if empties.is_blenders_own(empty) and takes_references(empty):
                 empty.name = empties.name_for(source, empty.matrix_world.translation, self.kind)
             entry = empties.add(source, empty, self.kind)
             entry.group = group if self.kind == "GROUP" else ""

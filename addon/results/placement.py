@@ -14,7 +14,7 @@ from ..blender.evaluation import is_driven, key_at, with_ancestors
 from ..blender.language import translated
 from ..blender.object_references import in_scene, settings_of
 from ..blender.property_definitions import effective_value
-from ..blender.references import remove_mesh_object
+from ..blender.references import remove_mesh_object, takes_references
 from ..blender.splat_layouts import holds_splats
 from ..carried import carrying, rest_bones
 from ..core.errors import UserError, refuse
@@ -59,11 +59,10 @@ def existing(context, source, kind, output):
 
 
 def register(source, kind, output, item):
-    """Notes a result in its source's list. Not in a linked source's, which undo leaves as it is: the list
-    would go on to point to an object that undo has removed, and Blender would crash."""
-    settings_of(item).made_from = source.name
-    if source.library is not None:
+    """Notes a result in its source's list; that of a linked source is an object of its own."""
+    if not takes_references(source):
         return
+    settings_of(item).made_from = source.name
     entries = settings_of(source).results
     earlier = (entry for entry in entries if entry.kind == kind and entry.output == output)
     entry = next(earlier, None) or entries.add()
@@ -455,7 +454,8 @@ def refusal_of_stack(source):
     """UserError that says why the mesh itself cannot take moved vertices; else None."""
     if keeps_vertices(source, in_place=True):
         return None
-    names = [modifier.name for modifier in modifier_stack.shown_before(source, in_place=True)]
+    before = modifier_stack.shown_before(source, in_place=True)
+    names = [modifier.name for modifier in before if not modifier_stack.is_layer(modifier)]
     if not names:
         return UserError("{name} shows one shape key alone, or absolute ones; choose Modifier", source)
     return UserError(

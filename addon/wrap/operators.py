@@ -7,7 +7,7 @@ import numpy as np
 from ..blender.evaluation import world_matrix
 from ..blender.host import has_window
 from ..blender.language import about, translated
-from ..blender.object_references import settings_of
+from ..blender.object_references import ObjectReference, settings_of
 from ..blender.property_definitions import annotations, effective_value, effective_values, integer, options_of
 from ..blender.source_operator import SourceOperator
 from ..blender.user_preferences import preset_classes
@@ -202,6 +202,7 @@ class ARAPFIELDS_OT_transfer(JobOperator, bpy.types.Operator):
         "groups": groups(options={"SKIP_SAVE"}),
         "mix": mix(options={"SKIP_SAVE"}),
     }
+    uncovered = ()  # ObjectReferences of sources whose wrap was a layer, until something is transferred
 
     @classmethod
     def refuses(cls, source):
@@ -214,7 +215,8 @@ class ARAPFIELDS_OT_transfer(JobOperator, bpy.types.Operator):
         refuse(
             transfer.refusal(source, target) or (transfer.key_refusal(source, target) if has_keys else None)
         )
-        layers.uncover(source)
+        if layers.uncover(source):
+            self.uncovered = (*self.uncovered, ObjectReference(source))
         match = Match(context, source, target, has_keys)
         wrap = settings_of(source).wrap
         named = effective_value("groups", wrap, self) if "GROUPS" in kinds else ""
@@ -223,9 +225,16 @@ class ARAPFIELDS_OT_transfer(JobOperator, bpy.types.Operator):
         def apply(_):
             work = transfer.Transfer(bpy.context, *match.get(), match, *mixed)
             done = work.carry(kinds)
+            self.uncovered = tuple(one for one in self.uncovered if one.uid != match.ends[0].uid)
             return transfer.message(work.target, done, work.notes)
 
         return Item(source.name, match.find, apply, edits=match.ends)
+
+    def clear_up(self, job):
+        """Makes wraps layers again of which nothing was transferred."""
+        for source in filter(None, (reference.find() for reference in self.uncovered)):
+            if layers.can_stay(source):
+                layers.cover(source)
 
 
 CLASSES = [

@@ -72,8 +72,8 @@ class ARAPFIELDS_OT_refit(JobOperator, bpy.types.Operator):
         """Makes the fitted copies, or moves those of an earlier run; returns the line to report."""
         source, target = (body.reference.get() for body in refit.bodies)
         posing, made = posing_rigs(source, target), {}
-        for garment, shape in zip(refit.worn, shapes, strict=True):
-            item = garment.unchanged()
+        items = [garment.unchanged() for garment in refit.worn]
+        for item, shape in zip(items, shapes, strict=True):
             made[item] = garments.copy_of(item, target, posing)
             garments.put(context, made[item], target, np.array(made[item].matrix_world), shape, posing)
         garments.remap_copies(made, garments.counterparts(source, target) | posing)

@@ -275,6 +275,7 @@ class Given:
 
 # Transfers a wrapped object's data to its target: shape keys, groups, attributes, edges, armature.
 
+MOST_UV_MAPS = 8  # of a mesh, in Blender
 LEAST_WEIGHT = 1e-4  # vertices below it are not assigned to a group
 
 
@@ -319,7 +320,9 @@ class Transfer:
         self.weights, self.mix, self.notes = weights, mix, []
 
     def carry(self, kinds):
-        """Transfers these kinds of data; returns {label: count}."""
+        """Transfers these kinds of data, or none of them; returns {label: count}."""
+        if "UV_MAPS" in kinds:
+            self.require_room()
         single_user(self.target)
         steps = {
             "KEYS": self.keys,
@@ -337,6 +340,12 @@ class Transfer:
             take_keys_back(self.source, self.target)
             garments.copy_drivers(self.source, self.target)
         return done
+
+    def require_room(self):
+        """Raises UserError if the target cannot take the UV maps."""
+        names = {*self.target.data.uv_layers.keys(), *(layer.name for layer in self.given.uv_maps)}
+        if len(names) > MOST_UV_MAPS:
+            raise UserError("{name} has no room for another UV map", self.target)
 
     def without_objects(self, kinds):
         """These kinds but for those that copy objects, which have places in the world."""
@@ -410,8 +419,6 @@ class Transfer:
                 *(self.moved[self.given.triangles], layer.values[self.given.corners].astype(float)),
             )
             there = mesh.uv_layers.get(layer.name) or mesh.uv_layers.new(name=layer.name, do_init=False)
-            if there is None:
-                raise UserError("{name} has no room for another UV map", self.target)
             there.uv.foreach_set("vector", values.astype(np.float32).ravel())
             crossing |= set(face[beyond].tolist())
         if crossing:

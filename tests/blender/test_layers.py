@@ -18,6 +18,7 @@ if IN_BLENDER:
     from addon.field_modifier import cache_modifier, layers, motion
     from addon.live import sessions
     from addon.pin_tool import drag
+    from addon.results import placement
     from addon.solver import frame_solver
 
 pytestmark = pytest.mark.in_blender
@@ -163,6 +164,57 @@ def test_a_style_that_is_changed_takes_off_what_lies_over_it(fails):
         assert np.abs(scenes.world_points(bar) - shape).max() < SAME and len(bar.modifiers) == 1
         assert bpy.ops.arapfields.deform(**QUICK) == {"FINISHED"}
     assert np.abs(scenes.world_points(bar) - moved).max() < SAME and structure(bar) == before
+
+
+def test_a_result_that_a_style_below_has_no_place_for_is_refused_before_the_solve():
+    """The style, which the deformation acts on, is a layer then, and what lies on it makes the vertices."""
+    bar, _, _ = styled()
+    with_handles(bar).location.z += 0.4
+    bpy.ops.arapfields.stylize(**STYLE)
+    shape = scenes.world_points(bar)
+    bar.modifiers.new("Lattice", "LATTICE")
+    bpy.context.view_layer.update()
+    before, deform = structure(bar), arapfields.deform
+    arapfields.deform = fail
+    try:
+        with pytest.raises(RuntimeError, match=r"has modifiers that change its vertices before \(Lattice\)"):
+            bpy.ops.arapfields.deform(result="KEY", **QUICK)
+    finally:
+        arapfields.deform = deform
+    assert structure(bar) == before and np.array_equal(scenes.world_points(bar), shape)
+
+
+@pytest.mark.parametrize("run", ["deform", "stylize"])
+def test_a_result_that_is_not_placed_leaves_the_layers(run):
+    """The mesh may have changed while the worker solved."""
+    bar, _, _ = styled()
+    with_handles(bar).location.z += 0.4
+    bpy.context.view_layer.update()
+    if run == "stylize":  # takes the deformation off the style
+        bpy.ops.arapfields.deform(**QUICK)
+    else:  # acts on the style, which is a layer meanwhile
+        bpy.ops.arapfields.stylize(**STYLE)
+    before, shape, put = structure(bar), scenes.world_points(bar), placement.place_result
+    placement.place_result = fail
+    try:
+        with pytest.raises(RuntimeError, match="no style"):
+            getattr(bpy.ops.arapfields, run)(**QUICK)
+    finally:
+        placement.place_result = put
+    assert structure(bar) == before and np.abs(scenes.world_points(bar) - shape).max() < SAME
+
+
+def test_of_several_empties_none_is_a_handle_where_one_is_refused():
+    bar, shape, _ = styled()
+    usable, flat = (scenes.cube_empty((x, 0, 0), (0.3, 0.6, 0.6), str(x)) for x in (-1, 1))
+    flat.scale.x = 0.0
+    bpy.context.view_layer.update()
+    before = structure(bar)
+    scenes.activate(usable, flat, bar)
+    with pytest.raises(RuntimeError, match="is flat"):
+        bpy.ops.arapfields.add_handle()
+    assert structure(bar) == before and np.array_equal(scenes.world_points(bar), shape)
+    assert not bar.arapfields.handles and usable.parent is None
 
 
 @pytest.mark.parametrize("way", ["box", "pin"])

@@ -5,6 +5,7 @@ import fnmatch
 import json
 import string
 import tempfile
+import time
 from pathlib import Path
 from urllib.parse import urlparse
 from urllib.request import url2pathname
@@ -517,6 +518,30 @@ def test_the_first_start_says_where_the_extension_is_and_only_the_first():
     assert "pin tool" in said[0][0] and "press N" in said[0][1] and "F3" in said[0][2] and said[1] == []
     assert stored.was_welcomed and saved.is_dirty
     assert bpy.app.background
+
+
+def test_the_first_start_waits_until_the_preferences_are_closed():
+    """There the extension was installed, in a window before that with the text."""
+
+    def window(kind, is_temporary):
+        screen = type("Screen", (), {"is_temporary": is_temporary})
+        screen.areas = [type("Area", (), {"type": kind, "regions": []})]
+        return type("Window", (), {"screen": screen})
+
+    kept, manager = first_run.bpy, type("Manager", (), {"windows": [window("VIEW_3D", False)]})
+    first_run.bpy = type("Bpy", (), {"context": type("C", (), {"window_manager": manager})})
+    try:
+        first_run.welcome.until = time.monotonic() + 0.5
+        manager.windows.append(window("PREFERENCES", True))
+        assert first_run.end() is not None
+        assert first_run.welcome.until > time.monotonic() + first_run.SECONDS - 1.0 and first_run.lines()
+        manager.windows.pop()
+        assert first_run.end() is not None
+        first_run.welcome.until = time.monotonic()
+        assert first_run.end() is None and first_run.lines() == []
+    finally:
+        first_run.bpy = kept
+        first_run.welcome.clear()
 
 
 # Every text that a user may read is in the translations, and templates keep their fields.

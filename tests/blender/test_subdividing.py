@@ -111,6 +111,7 @@ def test_polygons_are_divided_within():
 
 def test_too_many_vertices_are_refused_and_the_mesh_stays():
     bar = scenes.bar()
+    other = bpy.data.objects.new("Other", bar.data)
     before, most = len(bar.data.vertices), subdividing.MOST_VERTICES
     subdividing.MOST_VERTICES = 500
     try:
@@ -118,7 +119,7 @@ def test_too_many_vertices_are_refused_and_the_mesh_stays():
             bpy.ops.arapfields.subdivide(share=0.01)
     finally:
         subdividing.MOST_VERTICES = most
-    assert len(bar.data.vertices) == before
+    assert len(bar.data.vertices) == before and other.data == bar.data
 
 
 def test_undo_and_redo_take_the_mesh_and_its_users_along():

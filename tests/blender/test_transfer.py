@@ -13,7 +13,7 @@ if IN_BLENDER:
     from support.blender import scenes, wraps
     from support.blender.baking import cancelled_at, changed_at_work
     from support.blender.character import link
-    from support.blender.stacks import add_modifier
+    from support.blender.stacks import add_modifier, structure
     from support.blender.stages import Operator, all_said
     from support.blender.wraps import SMALL, bar_and_target, offsets, rigged_bar, soup_of
 
@@ -22,7 +22,7 @@ if IN_BLENDER:
     from addon.blender.evaluation import curves_of
     from addon.carried import rest_bones
     from addon.core.runtime import jobs
-    from addon.field_modifier import motion, node_group
+    from addon.field_modifier import layers, motion, node_group
     from addon.wrap import transfer
     from addon.wrap.matching import Wrapped
     from addon.wrap.operators import ARAPFIELDS_OT_transfer
@@ -163,6 +163,28 @@ def test_what_cannot_take_anything_is_named_and_kept():
     with pytest.raises(RuntimeError, match="Wrap Bar first"):
         bpy.ops.arapfields.transfer()
     assert scenes.everything(target) == kept
+
+
+def test_a_target_without_room_for_uv_maps_receives_nothing():
+    _, target, _ = wrapped_bar()
+    for number in range(8):  # as many as a mesh can have
+        target.data.uv_layers.new(name=f"Own {number}")
+    kept, names = scenes.everything(target), target.vertex_groups.keys()
+    with pytest.raises(RuntimeError, match="Other has no room for another UV map"):
+        bpy.ops.arapfields.transfer(transfer={"KEYS", "GROUPS", "ATTRIBUTES", "UV_MAPS"})
+    assert scenes.everything(target) == kept and target.vertex_groups.keys() == names
+    assert target.data.shape_keys is None
+
+
+def test_a_refused_transfer_leaves_the_wrap_a_layer():
+    """As it is where the user has removed the modifier of a deformation on it."""
+    item, _, _ = wrapped_bar()
+    item.arapfields.moved_by = "WRAP"
+    layers.cover(item)
+    before, shape = structure(item), scenes.world_points(item)
+    with pytest.raises(RuntimeError, match="no vertex group Tail"):
+        bpy.ops.arapfields.transfer(transfer={"GROUPS"}, groups="Tail")
+    assert structure(item) == before and np.array_equal(scenes.world_points(item), shape)
 
 
 def test_drivers_and_what_is_carried_go_to_the_target():

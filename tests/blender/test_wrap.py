@@ -16,8 +16,8 @@ import arapfields as af
 if IN_BLENDER:
     import bpy
     from mathutils import Matrix
-    from support.blender import character, scenes, wraps
-    from support.blender.baking import EXACT, at, cache_file, cancelled_at, stepped
+    from support.blender import character, scenes, stages, wraps
+    from support.blender.baking import EXACT, at, cache_file, cancelled_at, changed_at_work, stepped
     from support.blender.character import link, seen_mesh
     from support.blender.wraps import SMALL, bar_and_target, joints, rigged_bar, soup_of
     from support.geometry import wrap_cases as cases
@@ -35,6 +35,7 @@ if IN_BLENDER:
     from addon.wrap import landmarks
     from addon.wrap.landmark_tools import ARAPFIELDS_OT_click_landmarks as Operator
     from addon.wrap.landmark_tools import half
+    from addon.wrap.refitting import ARAPFIELDS_OT_refit
     from arapfields.cli import wrapping
 
 pytestmark = pytest.mark.in_blender
@@ -800,6 +801,17 @@ def test_a_second_run_moves_the_first_ones_copies_and_another_field_is_refused(t
     scenes.activate(shirt, body)
     with pytest.raises(RuntimeError, match="needs the extension"):
         bpy.ops.arapfields.refit(field=str(tmp_path / "a.txt"))
+
+
+def test_a_garment_that_is_edited_meanwhile_leaves_the_others_as_they_were():
+    body, _, worn = scene()
+    items = [worn[name][0] for name in ("Shirt", "Cap")]
+    scenes.activate(*items, body)
+    before = sorted(bpy.data.objects.keys())
+    operator = stages.Operator(ARAPFIELDS_OT_refit, gap=GAP, onto="", field="")
+    changed_at_work(operator, lambda: setattr(items[1].data.vertices[0].co, "z", 2.0))
+    assert "Cap changed while it was worked on" in operator.said[-1]
+    assert sorted(bpy.data.objects.keys()) == before
 
 
 # An outfit of one of our figures on two others: a twin, whose hand-made outfit is known, and the grown-up.

@@ -15,8 +15,8 @@ from addon.blender import modifier_stack
 from addon.core.runtime import jobs
 
 SCAN_AT = Vector((2.0, 0, 0))
-# Positions in the sidebar of a window of 1600 × 1000, with only Wrap open.
-EYEDROPPER, BUTTON, WRAP = (1263, 229), (1155, 275), (1155, 506)
+# Positions in the sidebar of a window of 1600 × 1000, with only Wrap open, below its header.
+EYEDROPPER, BUTTON, WRAP = ((x, panel.HEADER[1] + y) for x, y in ((1263, 30), (1155, 76), (1155, 307)))
 SETTLED = 1.5  # seconds until the sidebar's sections have stopped moving
 
 

@@ -33,9 +33,10 @@ def small(item):
     settings = settings_of(item)
     for group, values in SMALL.items():
         for name, value in values.items():
-            if hasattr(getattr(settings, group), name):
+            if getattr(getattr(settings, group), name, value) != value:
                 setattr(getattr(settings, group), name, value)
-    settings.resolution = 12
+    if settings.resolution != 12:
+        settings.resolution = 12
 
 
 def begin_file():
@@ -175,12 +176,23 @@ def dangling():
         named = [("data", item.data), ("parent", item.parent)]
         for modifier in item.modifiers:
             named += [(f"{modifier.name}: {path}", value) for path, value in references.references(modifier)]
-        settings = settings_of(item)
-        for group in (settings.handles, settings.results, settings.carried):
-            named += [
-                (one.path_from_id(), getattr(one, "empty", getattr(one, "item", None))) for one in group
-            ]
+        named += pointers(settings_of(item))
         found += [(item.name, path) for path, value in named if value is not None and is_gone(value, there)]
+    return found
+
+
+def pointers(group):
+    """[(path, data-block)] of all pointers in a group of settings, in its groups and lists."""
+    found = []
+    for one in group.bl_rna.properties:
+        if one.type == "COLLECTION":
+            found += [each for entry in getattr(group, one.identifier) for each in pointers(entry)]
+        elif one.type == "POINTER" and one.identifier != "rna_type":
+            value = getattr(group, one.identifier)
+            if isinstance(value, bpy.types.PropertyGroup):
+                found += pointers(value)
+            elif value is not None:
+                found.append((f"{group.path_from_id()}.{one.identifier}", value))
     return found
 
 
@@ -261,11 +273,15 @@ def strays():
 
 
 def settle():
-    """As the timer does, until every shape is as good as it gets."""
+    """As the timer does, until every shape is as good as it gets. One that swings without damping never
+    rests: it is not waited for."""
     for _ in range(5):
         before = dict(sessions.live)
         bpy.context.view_layer.update()
-        sessions.update(bpy.context, wait=WAIT, refined=True)
+        sessions.update(bpy.context)
+        rests = {uid: not session.has_motion for uid, session in sessions.live.items()}
+        if any([sessions.update_one(bpy.context, uid, WAIT, rests[uid]) for uid in rests]):
+            references.push("Live")
         if before == sessions.live:  # no solver was set up anew
             break
     bpy.context.view_layer.update()

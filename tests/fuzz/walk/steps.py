@@ -225,21 +225,10 @@ MODES = ("EDIT", "SCULPT", "WEIGHT_PAINT", "VERTEX_PAINT")
 # What needs a window, a file of its own, or ends the walk's scene.
 LEFT_OUT = {"pin_tool", "pin_hover", "pin_drag", "click_landmarks", "cancel", "clear_cache", "wrap_sequence"}
 LEFT_OUT |= {"export_animation", "bake", "open_log", "check"}
-LARGE = (
-    "iterations",
-    "samples",
-    "width",
-    "layers",
-    "batch",
-    "centers",
-    "stages",
-    "resolution",
-    "octaves",
-    "points",
-)
-LARGE += ("threads", "device", "subframes", "seed", "start", "end", "step", "seconds", "memory", "size")
-LARGE += ("quality",)  # that of a fit stands for large values of others
-LARGE += ("share",)  # subdivide divides a mesh into millions of faces by a small one
+# Large values of these take long: a fit's quality stands for others, a small share divides into many faces.
+LARGE = ("iterations", "samples", "width", "layers", "batch", "centers", "stages", "resolution", "octaves")
+LARGE += ("points", "threads", "device", "subframes", "seed", "start", "end", "step", "seconds", "memory")
+LARGE += ("size", "quality", "share")
 GROUPS = ("deform", "stylize", "wrap", "stiffness", "secondary", "contact", "bake", "skin", "fit", "pin")
 
 
@@ -268,10 +257,12 @@ class AllSteps(Undoing):
             return self.add() if name == "add" else None
         self.source = items[self.rng.integers(len(items))]
         self.old = self.source.name
-        if self.source.library is None:
-            world.small(self.source)  # it may be a result, which has settings of its own
         scenes.activate(self.source)
-        return getattr(self, name)()
+        said = getattr(self, name)()
+        for item in world.sources():  # within the step: a refused one changes nothing
+            if item.library is None:
+                world.small(item)  # a result has settings of its own, a preset others
+        return said
 
     @property
     def settings(self):
