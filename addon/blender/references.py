@@ -94,6 +94,8 @@ def paths_of(part, kind=None):
         return paths
     if not hasattr(part, "properties"):  # before Blender 5.2, inputs are ID properties
         return paths + [f'["{name}"]' for name in part.keys()]  # noqa: SIM118
+    if part.properties is None:  # in Blender 5.3, of a modifier without a node group
+        return paths
     for side in ("inputs", "outputs"):
         slots = getattr(part.properties, side)
         names = [one.identifier for one in slots.bl_rna.properties if one.type == "POINTER"]

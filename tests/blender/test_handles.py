@@ -795,3 +795,12 @@ def test_handles_of_a_hidden_object_are_not_in_view():
     bpy.context.collection.objects.link(result)
     bar.arapfields.results.add().item = result
     assert empty in [entry.empty for _, entry in handles_in_view(bpy.context)]
+
+
+def test_a_nodes_modifier_without_a_group_is_no_obstacle():
+    bar = scenes.bar()
+    bar.modifiers.new("Nodes", "NODES")
+    empty = scenes.cube_empty((1, 0, 0), (0.3, 0.6, 0.6))
+    bpy.context.view_layer.update()
+    scenes.activate(empty, bar)
+    assert bpy.ops.arapfields.add_handle() == {"FINISHED"} and empty.parent == bar

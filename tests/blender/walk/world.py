@@ -204,6 +204,7 @@ def is_gone(value, there):
 # The scene of a walk of shapes (tests/fuzz/walk), and what is shown beside what the file says should be.
 
 WAIT = 120  # seconds at most for a shape to settle; a busy machine needs them
+SHORTLY = 1  # the same for one with secondary motion
 NAMES = ("Bar", "Ball", "Shell")
 FEW = {"coarse_centers": 10, "fine_centers": 40, "samples": 400}
 
@@ -274,13 +275,13 @@ def strays():
 
 def settle():
     """As the timer does, until every shape is as good as it gets. One that swings without damping never
-    rests: it is not waited for."""
+    rests: it is waited for shortly."""
     for _ in range(5):
         before = dict(sessions.live)
         bpy.context.view_layer.update()
         sessions.update(bpy.context)
-        rests = {uid: not session.has_motion for uid, session in sessions.live.items()}
-        if any([sessions.update_one(bpy.context, uid, WAIT, rests[uid]) for uid in rests]):
+        waits = {uid: SHORTLY if one.has_motion else WAIT for uid, one in sessions.live.items()}
+        if any([sessions.update_one(bpy.context, uid, wait, refined=True) for uid, wait in waits.items()]):
             references.push("Live")
         if before == sessions.live:  # no solver was set up anew
             break
