@@ -54,7 +54,8 @@ TriangleMesh with_tiny_triangles(const TriangleMesh& mesh, double size) {
 
 /// Whether no triangle is folded but those that are before; and how far the vertices went on average.
 double moved_without_a_fold(const TriangleMesh& mesh, const Points& moved, const Contact& contact = {}) {
-  const Points result = sharpen(mesh.vertices, mesh.triangles, moved, cube, {}, {}, {}, {}, contact);
+  const Points result =
+      arapfields::sharpen(mesh.vertices, mesh.triangles, moved, cube, {}, {}, {}, {}, contact);
   const std::vector<Index> before = folded_triangles(mesh.vertices, mesh.triangles, moved),
                            after = folded_triangles(mesh.vertices, mesh.triangles, result);
   BOOST_TEST(std::includes(before.begin(), before.end(), after.begin(), after.end()));
@@ -63,7 +64,7 @@ double moved_without_a_fold(const TriangleMesh& mesh, const Points& moved, const
 
 }  // namespace
 
-BOOST_AUTO_TEST_SUITE(sharpening)
+BOOST_AUTO_TEST_SUITE(sharpen)
 
 BOOST_AUTO_TEST_CASE(single_folds_of_before_are_opened) {
   const TriangleMesh mesh = shapes::torus(40, 24);
@@ -73,7 +74,7 @@ BOOST_AUTO_TEST_CASE(single_folds_of_before_are_opened) {
     moved.row(from) += 1.5 * (moved.row(to) - moved.row(from));
   }
   BOOST_TEST(folded_triangles(mesh.vertices, mesh.triangles, moved).size() > 0);
-  const Points result = sharpen(mesh.vertices, mesh.triangles, moved, cube);
+  const Points result = arapfields::sharpen(mesh.vertices, mesh.triangles, moved, cube);
   BOOST_TEST(folded_triangles(mesh.vertices, mesh.triangles, result).empty());
 }
 
