@@ -46,7 +46,10 @@ class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
             return {"FINISHED"}
         earlier, was_live = sessions.live.get(source.session_uid), settings_of(source).live_kind
         try:
-            self.start(context, source, wait)
+            with (
+                references.unused_kept()
+            ):  # what a refused start takes away comes back without a step of undo
+                self.start(context, source, wait, earlier)
         except (UserError, ValueError) as error:
             if earlier is not None and not sessions.is_live(source):
                 sessions.go_back(context, source, earlier.former, earlier.kind)
@@ -55,15 +58,17 @@ class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
             return self.refuse(error)
         return {"FINISHED"}
 
-    def start(self, context, source, wait):
+    def start(self, context, source, wait, earlier):
+        """`earlier`: the session that goes on if this one is refused, or None."""
         if self.kind == "DEFORM" and not empties.used(source):
             raise UserError("{name} has no handle; add one in the panel's Handles section", source)
         is_style = self.kind == "STYLIZE"
         refuse(style_settings.refusal(source) if is_style else frozen(empties.used(source)))
         context.view_layer.update()
-        sessions.begin(context, source, self.kind)
+        sessions.begin(context, source, self.kind, goes_back=earlier is not None)
         if wait:
-            sessions.update_one(context, source.session_uid, wait)
+            shared = earlier.display if earlier is not None else None
+            sessions.update_one(context, source.session_uid, wait, shared=shared)
         if not sessions.is_live(source):
             raise UserError("{error}", error=jobs.messages()[-1][1])
 

@@ -101,10 +101,11 @@ def is_live(source, kind=None):
     return session is not None and kind in (None, session.kind)
 
 
-def begin(context, source, kind="DEFORM", keeps_shape=False, way=None):
+def begin(context, source, kind="DEFORM", keeps_shape=False, way=None, goes_back=False):
     """Makes the source live, or raises UserError. The shape appears once the worker has solved it.
 
     `keeps_shape`: what is shown stays when live mode ends. `way`: of layers.make_way(), if that is done.
+    `goes_back`: after an error the caller restarts the session that this one replaces; its display stays.
     """
     live.shown_scene.follow(context, live.values())
     end_for_kind(context, source, kind)
@@ -126,7 +127,7 @@ def begin(context, source, kind="DEFORM", keeps_shape=False, way=None):
         if returned is not None:
             live.paused.add(source.session_uid)
             live.past.keep(settings_of(source).live_number, returned)
-        elif session or earlier:
+        elif (session or earlier) and not (earlier and goes_back):
             take_away(session or earlier)
         else:
             layers.put_back(context, source, way)
@@ -235,8 +236,9 @@ def update(context, wait=0.0, refined=False):
         references.push("Live")
 
 
-def update_one(context, uid, wait=0.0, refined=False):
-    """The same for one session, without a step of undo; returns whether its end has changed the scene."""
+def update_one(context, uid, wait=0.0, refined=False, shared=None):
+    """The same for one session, without a step of undo; returns whether its end has changed the scene.
+    `shared`: the display of the session that goes on after an error, which stays."""
     for _ in range(2):  # a session that is set up anew with a held shape has it at once
         session = live[uid]
         try:
@@ -252,7 +254,7 @@ def update_one(context, uid, wait=0.0, refined=False):
                 if not restart(context, uid, session):
                     return True
         except (UserError, ValueError, ReferenceError) as error:
-            return end_with_error(uid, session, error)
+            return end_with_error(uid, session, error, stays=session.display is shared)
         if not live[uid].is_held:
             break
     return False
@@ -273,12 +275,13 @@ def warn(session):
         jobs.add_message("WARNING", about(session.source.name, reason), {session.source.uid})
 
 
-def end_with_error(uid, session, error):
-    """Ends a session and reports the error; undo may restart it. A deleted source is left as it is, and one
-    that undo has just brought back. Returns whether the scene has changed."""
+def end_with_error(uid, session, error, stays=False):
+    """Ends a session and reports the error; undo may restart it. A deleted source is left as it is, one that
+    undo has just brought back, and a display that `stays`. Returns whether the scene has changed."""
     source = session.source.find()
     live.part_with(uid)
-    changes = not session.is_back and (not session.display.in_place or source is None or in_scene(source))
+    is_there = not session.display.in_place or source is None or in_scene(source)
+    changes = is_there and not session.is_back and not stays
     if changes:
         take_away(session)
     elif session.is_back:

@@ -355,11 +355,22 @@ def test_a_refused_start_leaves_a_live_state_waiting():
     assert bar.arapfields.live_kind == "DEFORM" and bar.session_uid in sessions.live.paused
 
 
+def referred_to():
+    """session_uid of the objects in the scene, and of those that their modifiers refer to."""
+    shown = list(bpy.context.scene.objects)
+    helpers = {node_group.get(m, "Offsets") for item in shown for m in item.modifiers if m.type == "NODES"}
+    return {item.session_uid for item in helpers.union(shown) - {None}}
+
+
+@pytest.mark.parametrize("is_smooth", [False, True])
 @pytest.mark.parametrize("result", ["MODIFIER", "NEW"])
 @pytest.mark.parametrize("fails", ["at once", "later"])
-def test_a_refused_press_of_another_kind_leaves_live_mode(result, fails):
-    """Live Deform is refused while Live Stylize is on: that goes on, with its shape and no step of undo."""
+def test_a_refused_press_of_another_kind_leaves_live_mode(result, fails, is_smooth):
+    """Live Deform is refused while Live Stylize is on: that goes on, with its shape and no step of undo. No
+    data are new: undo would leave modifiers with references to them."""
     bar = scenes.bar()
+    if is_smooth:  # points are those of modifiers, and offsets lie on another mesh
+        bar.modifiers.new("Smooth", "SUBSURF")
     bar.arapfields.result = result
     scenes.activate(bar)
     assert bpy.ops.arapfields.live(kind="STYLIZE") == {"FINISHED"}
@@ -373,12 +384,13 @@ def test_a_refused_press_of_another_kind_leaves_live_mode(result, fails):
     shown = {
         item.name: scenes.world_points(item) for item in bpy.context.scene.objects if item.type == "MESH"
     }
-    pushed = references.pushed
+    pushed, objects = references.pushed, referred_to()
     with pytest.raises(RuntimeError, match="no handle" if fails == "at once" else "No part of the surface"):
         bpy.ops.arapfields.live(kind="DEFORM")
     step(refined=True)
     assert sessions.is_live(bar, "STYLIZE") and bar.arapfields.live_kind == "STYLIZE"
     assert references.pushed == pushed
+    assert referred_to() == objects
     now = shown_meshes()
     assert now.keys() == shown.keys() and len(now) == (1 if result == "MODIFIER" else 2)
     for name, points in shown.items():
