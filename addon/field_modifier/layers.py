@@ -216,7 +216,8 @@ def cover(source):
     motion.write_to(mesh, motion.read_from(mesh), number)
     if mesh != source.data or mesh.users == 1:
         motion.write_to(mesh, motion.Motion(None))
-    motion.take_group(field, node_group.find_or_make_layer(kind, number, normals))
+    with references.unused_kept():  # uncover() may take its group again, without a step of undo
+        motion.take_group(field, node_group.find_or_make_layer(kind, number, normals))
     rename(field, FIELD_MODIFIER, f"{FIELD_MODIFIER} {STAYING[kind]}")
     settings.under_rig, settings.moved_by = False, ""
 
