@@ -380,13 +380,13 @@ class Session:
         self.is_held = is_held
 
     def show(self):
-        """Shows the newest shape, if there is one."""
+        """Shows the newest shape; returns whether there is one."""
         shape, error = self.worker.poll() if self.worker is not None else (None, "")
         if error:
             raise UserError(error)
         shape = self.playback.shape(self.requested, otherwise=shape)
         if shape is None:
-            return
+            return False
         source = self.source.get()
         if self.is_quiet:
             if shape.of is not None and live_modifier.mark(source) == self.digest(shape.of):
@@ -394,6 +394,7 @@ class Session:
                 redraw(bpy.context, "WINDOW")
         else:
             self.show_shape(source, shape)
+        return True
 
     def show_shape(self, source, shape):
         """Shows a shape with what the source carries; returns whether the display could."""

@@ -245,9 +245,8 @@ def update_one(context, uid, wait=0.0, refined=False, shared=None):
             session.update(context)
             if wait:
                 session.wait(wait, refined)
-            session.show()
+            session.is_back = not session.show() and session.is_back
             warn(session)
-            session.is_back = False
             return False
         except SourceChanged:
             with references.between():

@@ -426,3 +426,26 @@ def test_a_release_changes_nothing_that_is_seen(rests):
     bpy.context.view_layer.update()
     assert world.difference(scenes.world_points(bar), shown) < OFF
     assert world.difference(world.shape(bar), world.fresh_shape(bar, "DEFORM")) < 1e-5
+
+
+def test_undo_goes_past_a_step_in_which_live_mode_fails():
+    """It fails anew there, which is no step of its own: undo would come back to it each time."""
+    bar, _, _ = scenes.bar_with_handles()
+    bar.modifiers.new("Smooth", "SUBSURF")
+    bpy.ops.ed.undo_push(message="bar")
+    bpy.ops.arapfields.live()
+    step(refined=True)
+    bpy.ops.ed.undo_push(message="live")
+    far = scenes.cube_empty((9.0, 0.0, 0.0), (0.3, 0.6, 0.6))
+    bpy.context.view_layer.update()
+    scenes.activate(far, bar)
+    bpy.ops.arapfields.add_handle(kind="POINT")  # too far off, as the worker finds
+    bpy.ops.ed.undo_push(message="handle")
+    step(refined=True)
+    assert not sessions.live  # its end is a step
+    for _ in range(2):
+        bpy.ops.ed.undo()
+        sessions.update(bpy.context)  # as the timer does, before there is a shape
+        step(refined=True)
+    bar = bpy.data.objects["Bar"]
+    assert len(bar.arapfields.handles) == 2 and sessions.is_live(bar)
