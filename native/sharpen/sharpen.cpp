@@ -230,6 +230,7 @@ class Finish {
               start_.row(i) + share * share * (3.0 - 2.0 * share) * (finished.row(i) - start_.row(i));
         }
       });
+      if (limits_.any()) limits_.keep(positions_);
     }
   }
 
