@@ -46,9 +46,8 @@ class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
             return {"FINISHED"}
         earlier, was_live = sessions.live.get(source.session_uid), settings_of(source).live_kind
         try:
-            with (
-                references.unused_kept()
-            ):  # what a refused start takes away comes back without a step of undo
+            # What a refused start takes away comes back without a step of undo.
+            with references.unused_kept():
                 self.start(context, source, wait, earlier)
         except (UserError, ValueError) as error:
             if earlier is not None and not sessions.is_live(source):
