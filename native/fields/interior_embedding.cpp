@@ -20,12 +20,13 @@
 namespace arapfields {
 namespace {
 
-constexpr Index most_nodes = 1500, least_nodes = 100, landmarks = 64;
+constexpr Index most_nodes = 1500, least_nodes = 100, landmarks = 64, samples_a_node = 4;
 /// Ratio of straight distances to the lengths of the graph's paths, which zigzag between nodes.
 constexpr double detour = 0.94;
 /// Factor on the differences between interior and Euclidean distances.
 constexpr double emphasis = 2.0;
 /// Weight of smoothing against the embedding's values, and the cutoff of a node's neighbours in spacings.
+constexpr double part_smoothing = 1.0;
 constexpr double smoothing = 10.0, neighbour_spacings = 3.0;
 /// Spread of ψ, as a fraction of the shape's size, below which Euclidean distances are used.
 constexpr double worthwhile_spread = 0.04;
@@ -34,6 +35,7 @@ constexpr double negligible = -36.0;
 
 /// Where parts of the shape nearly touch: a sample this near, in widths, whose normal is opposite (its cosine
 /// is below), in front of the node or hardly behind it (as a share of the width).
+constexpr double part_facing_widths = 2.5;
 constexpr double facing_widths = 1.0, facing_cosine = -0.3, facing_behind = 1e-3;
 /// Distance, in widths, up to which it matters what a node sees: a point is within one width of its own
 /// node, and a weight of e^{−9} is little.
@@ -82,11 +84,11 @@ Points leading_coordinates(const RowMatrix<double>& excess) {
 }
 
 /// (1 + smoothing · graph Laplacian)⁻¹ values, by conjugate gradients.
-Points smoothed(const Points& values, const Neighbours& neighbours) {
+Points smoothed(const Points& values, const Neighbours& neighbours, double strength) {
   const auto apply = [&](const Points& x) {
     Points y = x;
     for (std::size_t i = 0; i < neighbours.size(); ++i)
-      for (const Index j : neighbours[i]) y.row(i) += smoothing * (x.row(i) - x.row(j));
+      for (const Index j : neighbours[i]) y.row(i) += strength * (x.row(i) - x.row(j));
     return y;
   };
   Points x = values, residual = values - apply(x), direction = residual;
@@ -223,18 +225,6 @@ bool NodeSight::hides(SurfaceSide node, SurfaceSide other) const {
   return std::binary_search(others.begin() + starts[node], others.begin() + starts[node + 1], other);
 }
 
-void NodeSight::keep(std::shared_ptr<const TriangleMesh> mesh, std::vector<SurfaceSide> sides) {
-  mesh_ = std::move(mesh);
-  mesh_sides_ = std::move(sides);
-}
-
-const std::vector<SurfaceSide>* NodeSight::kept(const TriangleMesh& mesh) const {
-  const bool same = mesh_ && mesh_->vertices.rows() == mesh.vertices.rows() &&
-                    mesh_->triangles.rows() == mesh.triangles.rows() && mesh_->vertices == mesh.vertices &&
-                    mesh_->triangles == mesh.triangles;
-  return same ? &mesh_sides_ : nullptr;
-}
-
 namespace {
 
 /// Weights with which the excess at a place is blended from the company of its side: jets (company, 10) of
@@ -273,8 +263,80 @@ void blend_weights(const Vec3& place, const Points& nodes, const std::vector<std
 
 }  // namespace
 
+bool InteriorEmbedding::has_sides() const {
+  return sight != nullptr || std::ranges::any_of(parts, [](const EmbeddingPart& part) {
+           return part.embedding.sight != nullptr;
+         });
+}
+
+namespace {
+
+/// Replaces the jets of u at a point by those of u + s (v − u), with the jets of v and of s, which is the
+/// first component of `shares`, at row p.
+void blend_jets(JetView<const double> v, JetView<const double> shares, Index p, JetView<double> u,
+                Index row) {
+  std::array<double, 10> s{};
+  std::array<Vec3, 10> difference;
+  for (int c = 0; c < columns(u.order); ++c) {
+    s[static_cast<std::size_t>(c)] = shares.at(c, p)[0];
+    difference[static_cast<std::size_t>(c)] =
+        Eigen::Map<const Vec3>(v.at(c, p)) - Eigen::Map<const Vec3>(u.at(c, row));
+  }
+  const auto add = [&](int c, const Vec3& more) { Eigen::Map<Vec3>(u.at(c, row)) += more; };
+  add(0, s[0] * difference[0]);
+  if (columns(u.order) < 4) return;
+  const auto d = [&](int c) -> const Vec3& { return difference[static_cast<std::size_t>(c)]; };
+  const auto of_share = [&](int c) { return s[static_cast<std::size_t>(c)]; };
+  for (int i = 0; i < 3; ++i) {
+    const int column = first_column(i);
+    add(column, of_share(column) * d(0) + s[0] * d(column));
+  }
+  if (columns(u.order) < 10) return;
+  for (int i = 0; i < 3; ++i)
+    for (int j = i; j < 3; ++j) {
+      const int column = second_column(i, j);
+      add(column, of_share(column) * d(0) + of_share(first_column(i)) * d(first_column(j)) +
+                      of_share(first_column(j)) * d(first_column(i)) + s[0] * d(column));
+    }
+}
+
+}  // namespace
+
 void InteriorEmbedding::evaluate(PointsIn points, JetView<double> out,
                                  const std::vector<SurfaceSide>* sides) const {
+  if (parts.empty()) return evaluate_own(points, out, sides);
+  std::vector<SurfaceSide> own;
+  if (sides != nullptr) {
+    std::vector<SurfaceSide> of_nodes(static_cast<std::size_t>(nodes.rows()));
+    std::iota(of_nodes.begin(), of_nodes.end(), SurfaceSide{0});
+    for (const EmbeddingPart& part : parts)
+      of_nodes.insert(of_nodes.end(), part.sides.begin(), part.sides.end());
+    for (const SurfaceSide side : *sides)
+      own.push_back(side < 0 ? side : of_nodes[static_cast<std::size_t>(side)]);
+  }
+  evaluate_own(points, out, sides != nullptr ? &own : nullptr);
+  auto first = static_cast<SurfaceSide>(nodes.rows());
+  for (const EmbeddingPart& part : parts) {
+    const std::vector<Index> rows = part.ball.rows_inside(points);
+    const auto count = static_cast<SurfaceSide>(part.embedding.nodes.rows());
+    std::vector<SurfaceSide> of_rows;
+    for (std::size_t k = 0; sides != nullptr && k < rows.size(); ++k) {
+      const SurfaceSide side = (*sides)[static_cast<std::size_t>(rows[k])] - first;
+      of_rows.push_back(side >= 0 && side < count ? side : -1);
+    }
+    const Points near = points(rows, Eigen::all);
+    const std::vector<SurfaceSide>* const part_sides = sides != nullptr ? &of_rows : nullptr;
+    JetBlock<double> own_jets(near.rows(), out.order), shares(near.rows(), out.order);
+    part.embedding.evaluate_own(near, own_jets.view(), part_sides);
+    part.share.evaluate_own(near, shares.view(), part_sides);
+    for (Index p = 0; p < near.rows(); ++p)
+      blend_jets(own_jets.view(), shares.view(), p, out, rows[static_cast<std::size_t>(p)]);
+    first += count;
+  }
+}
+
+void InteriorEmbedding::evaluate_own(PointsIn points, JetView<double> out,
+                                     const std::vector<SurfaceSide>* sides) const {
   constexpr Index block = embedding_block;
   const Index count = points.rows(), n = nodes.rows();
   RowMatrix<double> rows(n, embedding_row);
@@ -368,7 +430,7 @@ struct SeenNodes {
 /// `nearest`: the node nearest to each point.
 SeenNodes nearest_seen(PointsIn points, PointsIn normals, PointsIn nodes, PointsIn node_normals,
                        const std::vector<std::int32_t>& nearest, double width, const InsideSight& mesh) {
-  const Index count = points.rows(), tried = std::min(most_tried, nodes.rows());
+  const Index count = points.rows(), tried = std::min<Index>(most_tried, nodes.rows());
   const InsideSight::Eyes from = eyes_of(points, normals, width, mesh),
                           to = eyes_of(nodes, node_normals, width, mesh);
   SeenNodes result{std::vector<Index>(static_cast<std::size_t>(count)),
@@ -480,9 +542,9 @@ void InteriorEmbedding::look(const std::vector<Index>& rows, PointsIn points, Po
   for (std::size_t k = 0; k < rows.size(); ++k) sides[rows[k]] = static_cast<SurfaceSide>(seen.nodes[k]);
 }
 
-std::vector<SurfaceSide> InteriorEmbedding::sides_of(PointsIn points, PointsIn normals,
-                                                     const InsideSight& mesh,
-                                                     std::vector<Index>* doubtful) const {
+std::vector<SurfaceSide> InteriorEmbedding::own_sides_of(PointsIn points, PointsIn normals,
+                                                         const InsideSight& mesh,
+                                                         std::vector<Index>* doubtful) const {
   if (!sight) return std::vector<SurfaceSide>(static_cast<std::size_t>(points.rows()), -1);
   std::vector<SurfaceSide> result = sight->nearest_nodes(points);
   const std::vector<Index> near = near_walls(result);
@@ -491,17 +553,107 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(PointsIn points, PointsIn n
   return result;
 }
 
+std::vector<SurfaceSide> InteriorEmbedding::sides_of(PointsIn points, PointsIn normals,
+                                                     const InsideSight& mesh) const {
+  std::vector<SurfaceSide> result = own_sides_of(points, normals, mesh);
+  auto first = static_cast<SurfaceSide>(nodes.rows());
+  for (const EmbeddingPart& part : parts) {
+    const std::vector<Index> rows = part.ball.rows_inside(points);
+    const std::vector<SurfaceSide> own =
+        part.embedding.own_sides_of(points(rows, Eigen::all), normals(rows, Eigen::all), mesh);
+    for (std::size_t k = 0; part.embedding.sight && k < rows.size(); ++k)
+      result[static_cast<std::size_t>(rows[k])] = first + own[k];
+    first += static_cast<SurfaceSide>(part.embedding.nodes.rows());
+  }
+  return result;
+}
+
 std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& mesh, const Frame& frame) const {
-  if (!sight) return std::vector<SurfaceSide>(static_cast<std::size_t>(mesh.vertices.rows()), -1);
-  if (const std::vector<SurfaceSide>* const known = sight->kept(mesh)) return *known;
+  if (!has_sides()) return std::vector<SurfaceSide>(static_cast<std::size_t>(mesh.vertices.rows()), -1);
+  const auto is_known = [&](const TriangleMesh& other) {
+    return mesh_ && mesh_->vertices.rows() == other.vertices.rows() &&
+           mesh_->triangles.rows() == other.triangles.rows() && mesh_->vertices == other.vertices &&
+           mesh_->triangles == other.triangles;
+  };
+  if (is_known(mesh)) return mesh_sides_;
   const TriangleMesh outward = facing_outwards(mesh);
-  if (const std::vector<SurfaceSide>* const known = sight->kept(outward)) return *known;
+  if (is_known(outward)) return mesh_sides_;
   return sides_of(outward, frame, InsideSight(outward, frame));
 }
 
+namespace {
+
+/// The vertices in a part's ball, and the triangles between them.
+TriangleMesh inside(const TriangleMesh& mesh, const std::vector<Index>& rows) {
+  std::vector<std::int32_t> place(static_cast<std::size_t>(mesh.vertices.rows()), -1), corners;
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    place[static_cast<std::size_t>(rows[k])] = static_cast<std::int32_t>(k);
+  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return place[static_cast<std::size_t>(mesh.triangles(t, k))]; };
+    if (corner(0) >= 0 && corner(1) >= 0 && corner(2) >= 0)
+      corners.insert(corners.end(), {corner(0), corner(1), corner(2)});
+  }
+  return {mesh.vertices(rows, Eigen::all),
+          Eigen::Map<const Triangles>(corners.data(), std::ssize(corners) / 3, 3)};
+}
+
+}  // namespace
+
 std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& outward, const Frame& frame,
-                                                     const InsideSight& mesh,
-                                                     std::vector<Index>* doubtful) const {
+                                                     const InsideSight& mesh) const {
+  std::vector<SurfaceSide> result = own_sides_of(outward, frame, mesh);
+  auto first = static_cast<SurfaceSide>(nodes.rows());
+  const Points places = frame.to_cube(outward.vertices);
+  for (const EmbeddingPart& part : parts) {
+    const std::vector<Index> rows = part.ball.rows_inside(places);
+    if (part.embedding.sight && !rows.empty()) {
+      const std::vector<SurfaceSide> own = part.embedding.own_sides_of(inside(outward, rows), frame, mesh);
+      for (std::size_t k = 0; k < rows.size(); ++k)
+        result[static_cast<std::size_t>(rows[k])] = first + own[k];
+    }
+    first += static_cast<SurfaceSide>(part.embedding.nodes.rows());
+  }
+  return result;
+}
+
+void InteriorEmbedding::look_at(PointsIn samples, PointsIn normals, std::shared_ptr<const TriangleMesh> mesh,
+                                const Frame& frame, const InsideSight& inside_sight) {
+  const auto know = [&](const InteriorEmbedding& own, PointsIn points, PointsIn directions,
+                        const TriangleMesh& of) {
+    std::vector<Index> near, near_vertices;
+    const std::vector<SurfaceSide> of_points = own.own_sides_of(points, directions, inside_sight, &near);
+    std::vector<SurfaceSide> of_vertices = own.own_sides_of(of, frame, inside_sight, &near_vertices);
+    Points places(std::ssize(near) + std::ssize(near_vertices), 3);
+    places << points(near, Eigen::all), frame.to_cube(Points(of.vertices(near_vertices, Eigen::all)));
+    std::vector<SurfaceSide> sides;
+    for (const Index i : near) sides.push_back(of_points[static_cast<std::size_t>(i)]);
+    for (const Index i : near_vertices) sides.push_back(of_vertices[static_cast<std::size_t>(i)]);
+    own.sight->set_places(places, std::move(sides));
+    return of_vertices;
+  };
+  mesh_sides_.assign(static_cast<std::size_t>(mesh->vertices.rows()), -1);
+  if (sight) mesh_sides_ = know(*this, samples, normals, *mesh);
+  const Points vertices = frame.to_cube(mesh->vertices);
+  auto first = static_cast<SurfaceSide>(nodes.rows());
+  for (EmbeddingPart& part : parts) {
+    if (sight && part.embedding.sight)
+      part.sides = own_sides_of(part.embedding.nodes, part.embedding.sight->normals, inside_sight);
+    const std::vector<Index> rows = part.ball.rows_inside(samples), of_mesh = part.ball.rows_inside(vertices);
+    if (part.embedding.sight) {
+      const std::vector<SurfaceSide> own =
+          know(part.embedding, samples(rows, Eigen::all), normals(rows, Eigen::all), inside(*mesh, of_mesh));
+      for (std::size_t k = 0; k < of_mesh.size(); ++k)
+        mesh_sides_[static_cast<std::size_t>(of_mesh[k])] = first + own[k];
+    }
+    first += static_cast<SurfaceSide>(part.embedding.nodes.rows());
+  }
+  mesh_ = std::move(mesh);
+}
+
+std::vector<SurfaceSide> InteriorEmbedding::own_sides_of(const TriangleMesh& outward, const Frame& frame,
+                                                         const InsideSight& mesh,
+                                                         std::vector<Index>* doubtful) const {
+  if (!sight) return std::vector<SurfaceSide>(static_cast<std::size_t>(outward.vertices.rows()), -1);
   const Points places = frame.to_cube(outward.vertices);
   std::vector<SurfaceSide> result = sight->nearest_nodes(places);
   const std::vector<Index> near = near_walls(result);
@@ -558,8 +710,7 @@ namespace {
 
 /// Marks the nodes near which parts of the shape nearly touch.
 std::vector<bool> near_other_parts(const Points& nodes, const Points& normals, PointsIn samples,
-                                   PointsIn sample_normals, double width) {
-  const double near = facing_widths * width;
+                                   PointsIn sample_normals, double width, double near) {
   std::vector<char> faces(static_cast<std::size_t>(nodes.rows()));
   parallel_for(0, nodes.rows(), 32, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i)
@@ -627,15 +778,28 @@ void measure(const InteriorGraph& graph, const Points& nodes, const Neighbours& 
 
 }  // namespace
 
-std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals, int axis,
-                                                      const MayJoin& may_join, const MakeSight& make_sight) {
+namespace {
+
+/// A fine region whose embedding is made, with ψ of the whole (n,3) at its points.
+struct RegionOfWhole {
+  const FineRegion& region;
+  Points known;
+  InteriorEmbedding share = {};  // that is made
+};
+
+/// interior_embedding(), or that of a part.
+std::shared_ptr<InteriorEmbedding> made_embedding(PointsIn samples, PointsIn normals, int axis,
+                                                  const MayJoin& may_join, const MakeSight& make_sight,
+                                                  RegionOfWhole* part) {
   if (samples.rows() < least_nodes || normals.rows() != samples.rows()) return nullptr;
   const Index most = axis < 0 ? most_nodes : most_nodes / 2;
-  const FarthestPoints chosen = farthest_points(samples, std::min<Index>(most, samples.rows()));
+  const FarthestPoints chosen = farthest_points(
+      samples, std::min<Index>(most, part ? samples.rows() / samples_a_node : samples.rows()));
   if (static_cast<Index>(chosen.indices.size()) < least_nodes || !(chosen.fill_distance > 0.0))
     return nullptr;
   InteriorEmbedding embedding;
   embedding.width = chosen.fill_distance;
+  const double facing = (part ? part_facing_widths : facing_widths) * embedding.width;
   // Where parts of the shape nearly touch, no edge of the graph crosses the surface.
   std::vector<Index> rows = chosen.indices;
   std::shared_ptr<const InsideSight> mesh;
@@ -652,7 +816,7 @@ std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn
       other_normals.col(axis).tail(samples.rows()) *= -1.0;
     }
     const std::vector<bool> marked = near_other_parts(samples(rows, Eigen::all), normals(rows, Eigen::all),
-                                                      others, other_normals, embedding.width);
+                                                      others, other_normals, embedding.width, facing);
     if (std::find(marked.begin(), marked.end(), true) != marked.end()) mesh = make_sight();
     if (mesh) {
       const std::vector<Index> added = unseen_samples(samples, normals, rows, marked, embedding.width, *mesh);
@@ -672,10 +836,10 @@ std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn
     embedding.sight = std::make_shared<NodeSight>();
     embedding.sight->reach = sight_widths * embedding.width;
     embedding.sight->normals = node_normals;
-    hidden =
-        hidden_pairs(embedding.nodes, node_normals,
-                     near_other_parts(embedding.nodes, node_normals, others, other_normals, embedding.width),
-                     embedding.width, *mesh);
+    hidden = hidden_pairs(
+        embedding.nodes, node_normals,
+        near_other_parts(embedding.nodes, node_normals, others, other_normals, embedding.width, facing),
+        embedding.width, *mesh);
   }
   const MayJoin nodes_may_join = [&](Index i, Index j) {
     return (!may_join || rows_may_join(i, j)) &&
@@ -701,16 +865,88 @@ std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn
   for (Index i = 0; i < n; ++i)
     for (const InteriorGraph::Edge& edge : graph.edges(i))
       if (edge.length < cutoff) neighbours[i].push_back(edge.to);
-  embedding.values = smoothed(embedding.values, neighbours);
+  embedding.values = smoothed(embedding.values, neighbours, part ? part_smoothing : smoothing);
+  if (part) {  // where the part ends, its values are those of the whole on average
+    const Vector outside = 1.0 - part->region.shares(rows).array();
+    const Points away = part->known(rows, Eigen::all) - embedding.values;
+    embedding.values.rowwise() += outside.transpose() * away / std::max(outside.sum(), 1e-12);
+  }
   const double size =
       (embedding.nodes.colwise().maxCoeff() - embedding.nodes.colwise().minCoeff()).maxCoeff();
   const Eigen::RowVector3d middle = embedding.values.colwise().mean();
   const double spread =
       (embedding.values.rowwise() - middle).colwise().squaredNorm().maxCoeff() / static_cast<double>(n);
-  if (spread < worthwhile_spread * worthwhile_spread * size * size && !embedding.sight) return nullptr;
+  if (spread < worthwhile_spread * worthwhile_spread * size * size && !embedding.sight && !part)
+    return nullptr;
   embedding.slopes = fitted_slopes(embedding.nodes, embedding.values, neighbours);
   if (axis >= 0) symmetrise(embedding, twins, axis);
+  if (part) {
+    part->share = embedding;
+    part->share.values.setZero();
+    part->share.values.col(0) = part->region.shares(rows);
+    part->share.slopes = fitted_slopes(embedding.nodes, part->share.values, neighbours);
+  }
   return std::make_shared<InteriorEmbedding>(std::move(embedding));
+}
+
+}  // namespace
+
+std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn samples, PointsIn normals, int axis,
+                                                      const MayJoin& may_join, const MakeSight& make_sight) {
+  return made_embedding(samples, normals, axis, may_join, make_sight, nullptr);
+}
+
+namespace {
+
+/// ±1: whether the coordinates of ψ are even or odd across the plane, by their values at points (n,3).
+Vec3 parity(const InteriorEmbedding& whole, Points points, int axis) {
+  Points here(points.rows(), 3), there = here;
+  whole.evaluate(points, {here.data(), here.rows(), JetOrder::value});
+  points.col(axis) *= -1.0;
+  whole.evaluate(points, {there.data(), there.rows(), JetOrder::value});
+  Vec3 result;
+  for (int k = 0; k < 3; ++k) result[k] = here.col(k).dot(there.col(k)) < 0.0 ? -1.0 : 1.0;
+  return result;
+}
+
+/// The reflection of a part's function, whose coordinates change by these signs.
+InteriorEmbedding reflected(const InteriorEmbedding& of, int axis, const Vec3& signs) {
+  InteriorEmbedding result = of;
+  result.nodes.col(axis) *= -1.0;
+  for (int k = 0; k < 3; ++k) {
+    result.values.col(k) *= signs[k];
+    for (int i = 0; i < 3; ++i) result.slopes.col(3 * k + i) *= i == axis ? -signs[k] : signs[k];
+  }
+  if (!of.sight) return result;
+  result.sight = std::make_shared<NodeSight>(*of.sight);
+  result.sight->normals.col(axis) *= -1.0;
+  result.sight->set_nodes(result.nodes, result.width);
+  return result;
+}
+
+}  // namespace
+
+void add_parts(InteriorEmbedding& whole, const std::vector<FineRegion>& regions, const MakeSight& make_sight,
+               int axis) {
+  std::vector<EmbeddingPart> parts;
+  for (const FineRegion& region : regions) {
+    RegionOfWhole part{region, Points(region.points.rows(), 3)};
+    whole.evaluate(region.points, {part.known.data(), part.known.rows(), JetOrder::value});
+    const auto made = made_embedding(region.points, region.normals, -1, {}, make_sight, &part);
+    if (!made) continue;
+    parts.push_back({*made, part.share, {}, region.ball});
+    if (axis < 0) continue;
+    EmbeddingPart twin{reflected(*made, axis, parity(whole, region.points, axis)),
+                       reflected(part.share, axis, Vec3::Ones()),
+                       {},
+                       region.ball};
+    twin.share.sight = twin.embedding.sight;
+    twin.ball.center[axis] *= -1.0;
+    parts.push_back(std::move(twin));
+  }
+  for (EmbeddingPart& part : parts)
+    part.sides.assign(static_cast<std::size_t>(part.embedding.nodes.rows()), -1);
+  whole.parts = std::move(parts);
 }
 
 }  // namespace arapfields

@@ -11,11 +11,13 @@
 #include "distance/signed_distance.h"
 #include "fields/inside_sight.h"
 #include "fields/interior_distance.h"
+#include "sampling/fine_regions.h"
 
 namespace arapfields {
 
 /// The side of the surface that a point lies on: the nearest node that it sees through the inside (row of the
-/// nodes). −1: unknown; all nodes are then weighted by their straight distance.
+/// nodes; those of an embedding's parts follow its own, part by part). −1: unknown; all nodes are then
+/// weighted by their straight distance.
 using SurfaceSide = std::int32_t;
 
 /// What the nodes of an embedding see of each other, where parts of the shape nearly touch through the
@@ -51,10 +53,6 @@ struct ARAPFIELDS_EXPORT NodeSight {
   const std::vector<SurfaceSide>& sides() const { return sides_; }
   /// The sides (n) of points (n,3): those of the nearest places; −1 farther than `reach` from all nodes.
   std::vector<SurfaceSide> sides_near(PointsIn points) const;
-  /// Keeps the sides of the vertices of a mesh, in mesh coordinates, so that they are not found again.
-  void keep(std::shared_ptr<const TriangleMesh> mesh, std::vector<SurfaceSide> sides);
-  /// The kept sides; null unless `mesh` has the vertices and the triangles of the kept one.
-  const std::vector<SurfaceSide>* kept(const TriangleMesh& mesh) const;
 
  private:
   std::vector<bool> doubtful_;
@@ -63,43 +61,68 @@ struct ARAPFIELDS_EXPORT NodeSight {
   Points places_ = Points(0, 3);
   std::vector<SurfaceSide> sides_;
   std::shared_ptr<const SignedDistance> nearest_place_;
-  std::shared_ptr<const TriangleMesh> mesh_;
-  std::vector<SurfaceSide> mesh_sides_;
 };
+
+struct EmbeddingPart;
 
 /// An embedding ψ that separates parts which are near in space but far apart inside the shape:
 /// |x − y|² + |ψ(x) − ψ(y)|² approximates the squared interior distance from x to y. ψ is given by values and
 /// gradients at nodes of the surface and blended between them with normalised Gaussian weights, as wide as
 /// the nodes' spacing (Franke and Little's modification of Shepard's method). In the weights, a node that a
 /// point's side does not see counts by its interior distance: ψ is a function on the surface, not in space,
-/// and parts that touch at rest have values of their own.
+/// and parts that touch at rest have values of their own. Fine parts have nodes of their own, and add to ψ
+/// what these nodes' spacing does not resolve.
 struct ARAPFIELDS_EXPORT InteriorEmbedding {
   Points nodes;                                ///< (n,3)
   Points values;                               ///< (n,3) ψ at the nodes
   RowMatrix<double> slopes;                    ///< (n,9) ∂ψ_k/∂x_i at 3 k + i
   double width = 0.0;                          ///< of the Gaussians e^{−|x|²/width²}
   std::shared_ptr<NodeSight> sight = nullptr;  ///< null: all nodes that are near see each other
+  std::vector<EmbeddingPart> parts;            ///< what is finer than the nodes' spacing
 
+  /// Whether ψ depends on the side of a point.
+  bool has_sides() const;
   /// Jets of ψ at points (n,3), of any order, each on its side (n); null: on that of the nearest known place.
   void evaluate(PointsIn points, JetView<double> out, const std::vector<SurfaceSide>* sides = nullptr) const;
-  /// The sides (n) of points (n,3) of a surface with outward unit normals (n,3). `doubtful`: is given the
-  /// rows of the points near doubtful nodes.
-  std::vector<SurfaceSide> sides_of(PointsIn points, PointsIn normals, const InsideSight& mesh,
-                                    std::vector<Index>* doubtful = nullptr) const;
+  /// The sides (n) of points (n,3) of a surface with outward unit normals (n,3).
+  std::vector<SurfaceSide> sides_of(PointsIn points, PointsIn normals, const InsideSight& mesh) const;
   /// The same of a mesh's vertices, in mesh coordinates; `frame` is that of the nodes' cube. The ends of a
   /// short edge lie on sides that see each other, so that no such edge is torn, and vertices in one place on
   /// one side if triangles join them, so that no seam is.
   std::vector<SurfaceSide> sides_of(const TriangleMesh& mesh, const Frame& frame) const;
-  /// The same for a mesh whose triangles face outwards.
-  std::vector<SurfaceSide> sides_of(const TriangleMesh& outward, const Frame& frame, const InsideSight& sight,
-                                    std::vector<Index>* doubtful = nullptr) const;
+  /// Looks at the surface that the nodes lie on, by samples (n,3) of it with their normals and by the
+  /// vertices of its mesh, whose triangles face outwards: points of unknown sides take that of the nearest of
+  /// these, and the mesh's own are kept.
+  void look_at(PointsIn samples, PointsIn normals, std::shared_ptr<const TriangleMesh> mesh,
+               const Frame& frame, const InsideSight& sight);
 
  private:
+  void evaluate_own(PointsIn points, JetView<double> out, const std::vector<SurfaceSide>* sides) const;
+  /// Sides among the nodes of the embedding alone; `doubtful`: is given the rows of the points near doubtful
+  /// nodes.
+  std::vector<SurfaceSide> own_sides_of(PointsIn points, PointsIn normals, const InsideSight& mesh,
+                                        std::vector<Index>* doubtful = nullptr) const;
+  std::vector<SurfaceSide> own_sides_of(const TriangleMesh& outward, const Frame& frame,
+                                        const InsideSight& mesh,
+                                        std::vector<Index>* doubtful = nullptr) const;
+  std::vector<SurfaceSide> sides_of(const TriangleMesh& outward, const Frame& frame,
+                                    const InsideSight& mesh) const;
   /// The rows of points whose nearest node is doubtful.
   std::vector<Index> near_walls(const std::vector<SurfaceSide>& nearest) const;
   /// Replaces these rows' sides, their nearest nodes, by the nearest ones that they see.
   void look(const std::vector<Index>& rows, PointsIn points, PointsIn normals, const InsideSight& mesh,
             std::vector<SurfaceSide>& sides) const;
+
+  std::shared_ptr<const TriangleMesh> mesh_;  // that was looked at
+  std::vector<SurfaceSide> mesh_sides_;
+};
+
+/// A fine part of a shape, such as a hand with its fingers.
+struct EmbeddingPart {
+  InteriorEmbedding embedding;     ///< its own ψ, from denser nodes; has no parts
+  InteriorEmbedding share;         ///< in the first component, that of its own ψ: 1 inside, 0 from its rim on
+  std::vector<SurfaceSide> sides;  ///< of its nodes, among those of the whole
+  Ball ball;                       ///< outside of which its share is 0
 };
 
 /// Makes the sight of the surface when it is needed; null where the surface is not known.
@@ -115,5 +138,10 @@ ARAPFIELDS_EXPORT std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn
                                                                         int axis = -1,
                                                                         const MayJoin& may_join = {},
                                                                         const MakeSight& make_sight = {});
+
+/// Gives an embedding of samples a part for each fine region of their surface. With an axis, the regions lie
+/// on the side where that coordinate is positive, and their reflections are parts as well.
+void add_parts(InteriorEmbedding& whole, const std::vector<FineRegion>& regions, const MakeSight& make_sight,
+               int axis = -1);
 
 }  // namespace arapfields

@@ -23,6 +23,16 @@ void validate(const InteriorEmbedding& given) {
   require(given.nodes.allFinite() && given.values.allFinite() && given.slopes.allFinite(), "embedding",
           "NaN or infinity", "finite numbers are needed");
   require_positive("embedding.width", given.width);
+  for (const EmbeddingPart& part : given.parts) {
+    validate(part.embedding);
+    validate(part.share);
+    const Index own = part.embedding.nodes.rows();
+    require(part.share.nodes.rows() == own && std::ssize(part.sides) == own && part.embedding.parts.empty(),
+            "embedding.parts", std::to_string(std::ssize(part.sides)) + " sides",
+            "one for each of the part's " + std::to_string(own) + " nodes is needed");
+    require(part.ball.center.allFinite() && std::isfinite(part.ball.radius), "embedding.parts",
+            "NaN or infinity", "finite numbers are needed");
+  }
 }
 
 /// The point farthest from the mean, without outliers.

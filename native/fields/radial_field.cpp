@@ -60,7 +60,7 @@ void RadialField::evaluate(PointsIn points, JetView<double> out,
 Points RadialField::at(PointsIn mesh_points) const { return moved(mesh_points, nullptr); }
 
 Points RadialField::at_vertices(const TriangleMesh& mesh) const {
-  if (!basis_.embedding || !basis_.embedding->sight) return at(mesh.vertices);
+  if (!basis_.embedding || !basis_.embedding->has_sides()) return at(mesh.vertices);
   const std::vector<SurfaceSide> sides = basis_.embedding->sides_of(mesh, frame());
   return moved(mesh.vertices, &sides);
 }

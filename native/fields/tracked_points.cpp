@@ -18,7 +18,7 @@ TrackedPoints::TrackedPoints(const RadialBasis& basis, const Frame& frame, Point
   Points sorted(mesh_points.rows(), 3);
   for (Index i = 0; i < sorted.rows(); ++i) sorted.row(i) = mesh_points.row(order_[i]);
   std::vector<SurfaceSide> sides;
-  if (triangles_ && basis.embedding && basis.embedding->sight) {
+  if (triangles_ && basis.embedding && basis.embedding->has_sides()) {
     const std::vector<SurfaceSide> given = basis.embedding->sides_of({mesh_points, *triangles_}, frame);
     for (const std::uint32_t i : order_) sides.push_back(given[i]);
   }

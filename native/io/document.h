@@ -109,7 +109,8 @@ class JsonObject {
 
 /// The version that is written. One that changes what a file holds gets the next number, and load_document's
 /// callers keep a reader for each number before.
-inline constexpr int file_version = 3;  // 2: with a checksum; 3: what an embedding's nodes see of each other
+// 2: with a checksum; 3: what an embedding's nodes see of each other; 4: an embedding's fine parts
+inline constexpr int file_version = 4;
 
 /// Writes arrays with their metadata.
 void save_document(const std::string& path, const std::string& kind, const Json& structure,

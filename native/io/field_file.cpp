@@ -126,6 +126,10 @@ std::string step_prefix(const std::string& prefix, std::size_t step) {
   return prefix + "steps[" + std::to_string(step) + "].";
 }
 
+std::string part_prefix(const std::string& prefix, std::size_t part) {
+  return prefix + "parts[" + std::to_string(part) + "].";
+}
+
 /// Adds a field's arrays to a file and owns those that are copies.
 class FieldArrays {
  public:
@@ -180,11 +184,30 @@ class FieldArrays {
       file.add(prefix + "influence.reaches", {influence->reaches().size()}, influence->reaches().data());
     }
     if (!basis.embedding) return;
-    add_rows(prefix + "embedding.nodes", basis.embedding->nodes);
-    add_rows(prefix + "embedding.values", basis.embedding->values);
-    add_rows(prefix + "embedding.slopes", basis.embedding->slopes);
-
-    if (basis.embedding->sight) add_sight(*basis.embedding->sight, prefix + "embedding.sight.");
+    add_embedding(*basis.embedding, prefix + "embedding.");
+  }
+  void add_embedding(const InteriorEmbedding& embedding, const std::string& prefix) {
+    add_rows(prefix + "nodes", embedding.nodes);
+    add_rows(prefix + "values", embedding.values);
+    add_rows(prefix + "slopes", embedding.slopes);
+    if (embedding.sight) add_sight(*embedding.sight, prefix + "sight.");
+    for (std::size_t k = 0; k < embedding.parts.size(); ++k) {
+      const EmbeddingPart& part = embedding.parts[k];
+      const std::string own = part_prefix(prefix, k);
+      add_embedding(part.embedding, own);
+      const Index n = part.embedding.nodes.rows();
+      Vector& shares = doubles_.emplace_back(part.share.values.col(0));
+      file.add(own + "shares", {n}, shares.data());
+      Vector& slopes =
+          doubles_.emplace_back(RowMatrix<double>(part.share.slopes.leftCols(3)).reshaped<Eigen::RowMajor>());
+      file.add(own + "share_slopes", {n, 3}, slopes.data());
+      Vector& ball = doubles_.emplace_back(4);
+      ball << part.ball.center, part.ball.radius;
+      file.add(own + "ball", {4}, ball.data());
+      Vector& sides = doubles_.emplace_back(n);
+      std::copy(part.sides.begin(), part.sides.end(), sides.begin());
+      file.add(own + "sides", {n}, sides.data());
+    }
   }
   void add_sight(const NodeSight& sight, const std::string& prefix) {
     const auto add_list = [&](const char* name, const auto& list) {
@@ -209,15 +232,22 @@ class FieldArrays {
   std::deque<Vector> doubles_;
 };
 
+Json embedding_structure(const InteriorEmbedding& embedding) {
+  Json structure{{"nodes", embedding.nodes.rows()}, {"width", embedding.width}};
+  if (embedding.sight)
+    structure["sight"] = {{"pairs", std::ssize(embedding.sight->others)},
+                          {"places", embedding.sight->places().rows()},
+                          {"reach", embedding.sight->reach}};
+  for (const EmbeddingPart& part : embedding.parts)
+    structure["parts"].push_back(embedding_structure(part.embedding));
+  return structure;
+}
+
 void add_radial_structure(const RadialField& field, Json& structure) {
   structure["centers"] = field.basis().center_count();
   if (field.influence()) structure["influence"] = field.influence()->places().rows();
   if (const InteriorEmbedding* embedding = field.basis().embedding.get()) {
-    structure["embedding"] = {{"nodes", embedding->nodes.rows()}, {"width", embedding->width}};
-    if (embedding->sight)
-      structure["embedding"]["sight"] = {{"pairs", std::ssize(embedding->sight->others)},
-                                         {"places", embedding->sight->places().rows()},
-                                         {"reach", embedding->sight->reach}};
+    structure["embedding"] = embedding_structure(*embedding);
   }
 }
 
@@ -325,6 +355,51 @@ std::shared_ptr<NodeSight> read_sight(ArchiveReader& file, const JsonObject& obj
   return sight;
 }
 
+InteriorEmbedding read_embedding(ArchiveReader& file, const JsonObject& object, const std::string& prefix) {
+  // What nodes see of each other is looked at pair by pair; the library makes at most 2,250.
+  constexpr Index most_sighted = 20'000;
+  const Index nodes = object.integer("nodes", 1, object.has("sight") ? most_sighted : most_rows);
+  InteriorEmbedding restored;
+  restored.nodes = file.points(prefix + "nodes", nodes);
+  restored.values = file.points(prefix + "values", nodes);
+  const Vector slopes = file.doubles(prefix + "slopes", {nodes, 9});
+  restored.slopes = Eigen::Map<const RowMatrix<double>>(slopes.data(), nodes, 9);
+  restored.width = object.number("width");
+  if (object.has("sight")) {
+    restored.sight =
+        read_sight(file, JsonObject(object.at("sight"), object.name("sight"), {"pairs", "places", "reach"}),
+                   prefix + "sight.", nodes);
+    restored.sight->set_nodes(restored.nodes, restored.width);
+  }
+  if (!object.has("parts")) return restored;
+  constexpr std::size_t most_parts = 10'000;
+  const Json& parts = object.at("parts");
+  const std::string name = object.name("parts");
+  require(parts.is_array() && parts.size() <= most_parts, name, "no list, or a long one", "a list is needed");
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const std::string own = part_prefix(prefix, k);
+    EmbeddingPart part;
+    part.embedding = read_embedding(
+        file, JsonObject(parts[k], name + "[" + std::to_string(k) + "]", {"nodes", "width", "sight"}), own);
+    const Index n = part.embedding.nodes.rows();
+    part.share = part.embedding;
+    part.share.values.setZero();
+    part.share.values.col(0) = file.doubles(own + "shares", {n});
+    const Vector slopes_of_share = file.doubles(own + "share_slopes", {n, 3});
+    part.share.slopes.setZero();
+    part.share.slopes.leftCols(3) = Eigen::Map<const RowMatrix<double>>(slopes_of_share.data(), n, 3);
+    const Vector ball = file.doubles(own + "ball", {4});
+    part.ball = {ball.head<3>(), ball[3]};
+    for (const double side : file.doubles(own + "sides", {n})) {
+      require(side >= -1.0 && side < static_cast<double>(nodes) && side == std::floor(side), own + "sides",
+              number_text(side), "whole numbers from -1 to " + std::to_string(nodes - 1) + " are needed");
+      part.sides.push_back(static_cast<SurfaceSide>(side));
+    }
+    restored.parts.push_back(std::move(part));
+  }
+  return restored;
+}
+
 std::shared_ptr<RadialField> read_radial(ArchiveReader& file, const JsonObject& object,
                                          const std::string& prefix) {
   const Index count = object.integer("centers", 0, most_rows);
@@ -332,22 +407,10 @@ std::shared_ptr<RadialField> read_radial(ArchiveReader& file, const JsonObject& 
   basis.centers = file.points(prefix + "centers", count);
   basis.radii = file.doubles(prefix + "radii", {count});
   if (object.has("embedding")) {
-    const JsonObject embedding(object.at("embedding"), object.name("embedding"), {"nodes", "width", "sight"});
-    // What nodes see of each other is looked at pair by pair; the library makes at most 2,250.
-    constexpr Index most_sighted = 20'000;
-    const Index nodes = embedding.integer("nodes", 1, embedding.has("sight") ? most_sighted : most_rows);
-    InteriorEmbedding restored;
-
-    restored.nodes = file.points(prefix + "embedding.nodes", nodes);
-    restored.values = file.points(prefix + "embedding.values", nodes);
-    const Vector slopes = file.doubles(prefix + "embedding.slopes", {nodes, 9});
-    restored.slopes = Eigen::Map<const RowMatrix<double>>(slopes.data(), nodes, 9);
-    restored.width = embedding.number("width");
-    if (embedding.has("sight"))
-      restored.sight = read_sight(
-          file, JsonObject(embedding.at("sight"), embedding.name("sight"), {"pairs", "places", "reach"}),
-          prefix + "embedding.sight.", nodes);
-    if (restored.sight) restored.sight->set_nodes(restored.nodes, restored.width);
+    InteriorEmbedding restored = read_embedding(
+        file,
+        JsonObject(object.at("embedding"), object.name("embedding"), {"nodes", "width", "sight", "parts"}),
+        prefix + "embedding.");
     basis.set_embedding(std::make_shared<const InteriorEmbedding>(std::move(restored)));
   }
   std::shared_ptr<const Influence> influence;

@@ -6,6 +6,7 @@
 
 #include "core/frame.h"
 #include "core/parallel.h"
+#include "sampling/fine_regions.h"
 #include "sampling/inner_balls.h"
 #include "sampling/sample_choice.h"
 
@@ -86,7 +87,40 @@ LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::ve
   median_ = sorted[n / 2];
 }
 
+/// The thickness of a fine region by its own points.
+struct LocalThickness::Fine {
+  FineRegion region;
+  LocalThickness thickness;
+};
+
+void LocalThickness::refine(const FineRegion& region) {
+  fine_.push_back(std::make_shared<const Fine>(
+      Fine{region, LocalThickness(region.points, region.normals, canonical_order(region.points))}));
+}
+
+Points LocalThickness::thinner_than(double thickness) const {
+  std::vector<Index> rows;
+  for (Index i = 0; i < values_.size(); ++i)
+    if (values_[i] < thickness) rows.push_back(i);
+  return nodes_(rows, Eigen::all);
+}
+
 Vector LocalThickness::at(PointsIn points) const {
+  Vector result = blended(points);
+  for (const auto& fine : fine_) {
+    const Vector shares = fine->region.shares_at(points);
+    std::vector<Index> rows;
+    for (Index i = 0; i < shares.size(); ++i)
+      if (shares[i] > 0.0) rows.push_back(i);
+    if (rows.empty()) continue;
+    const Vector own = fine->thickness.blended(points(rows, Eigen::all));
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      result[rows[k]] += shares[rows[k]] * (own[static_cast<Index>(k)] - result[rows[k]]);
+  }
+  return result;
+}
+
+Vector LocalThickness::blended(PointsIn points) const {
   Vector result = Vector::Constant(points.rows(), most_);
   const Index n = nodes_.rows();
   if (n == 0) return result;

@@ -2,11 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/types.h"
 
 namespace arapfields {
+
+struct FineRegion;
 
 /// The local thickness of a shape at points of its surface, in units of the points: the radius of the largest
 /// ball inside the shape that (nearly) contains the point, averaged over neighbours (half of Hildebrand and
@@ -22,15 +25,24 @@ class LocalThickness {
   LocalThickness(PointsIn samples, PointsIn normals, const std::vector<std::uint32_t>& order,
                  const Vector& sheet_sizes = {});
 
+  /// Measures the thickness in a fine region anew, at its own points.
+  void refine(const FineRegion& region);
+
   /// At points (m,3) of the surface.
   Vector at(PointsIn points) const;
+  /// Places of the surface at which it was measured to be less than this.
+  Points thinner_than(double thickness) const;
   /// The median over the surface.
   double median() const { return median_; }
 
  private:
+  Vector blended(PointsIn points) const;
+
   Points nodes_;
   Vector values_;             // at nodes
   std::vector<bool> sheets_;  // whether nodes lie on open sheets
+  struct Fine;
+  std::vector<std::shared_ptr<const Fine>> fine_;
   double spacing_ = 0.0, most_ = 0.0, median_ = 0.0;
 };
 

@@ -97,7 +97,7 @@ Index RadialSolver::add_fold_samples(double barrier, const DeformationField& now
   s.problem.options.surface.barrier = barrier;
   if (places.points.rows() > 0) {
     const Index before = s.problem.samples.size();
-    s.style.repeat(s.problem.add_samples(places));
+    s.problem.add_samples(places);
     for (Index row = before; row < s.problem.samples.size(); ++row) added.push_back(row);
     if (s.handles.any()) s.handles.set(std::vector<Handle>(handles()));  // which may hold some of them
   }

@@ -25,14 +25,16 @@ void SurfaceDynamics::set(const std::optional<SecondaryMotion>& motion) {
     motion->options.validate();
     require(!problem_.blend, "secondary motion", "with exact handles", "it needs handles that pull");
     const Vector& m = motion->masses;
-    const Index count = problem_.samples.size();
+    const Index count = problem_.given_count();
     const std::string one = "one mass ≥ 0 for each of the " + std::to_string(count) + " samples";
     require(m.size() == 0 || m.size() == count, "masses", std::to_string(m.size()) + " numbers",
             one + ", or none, is needed");
     require(m.allFinite() && (m.size() == 0 || m.minCoeff() >= 0.0), "masses",
             "negative or non-finite numbers", one + ", or none, is needed");
-    require(m.size() == 0 || entries_of(m, problem_.energy_samples).maxCoeff() > 0.0, "masses",
-            "zero everywhere", "something must have a mass; strength 0 takes the secondary motion away");
+    require(
+        m.size() == 0 || entries_of(problem_.at_all("masses", m), problem_.energy_samples).maxCoeff() > 0.0,
+        "masses", "zero everywhere",
+        "something must have a mass; strength 0 takes the secondary motion away");
     const double length = motion->up.stableNorm();
     require(std::isfinite(length) && length > 0.0, "up", length == 0.0 ? "zero" : "NaN or infinite",
             "a finite direction of any positive length is allowed");
@@ -49,8 +51,12 @@ void SurfaceDynamics::set(const std::optional<SecondaryMotion>& motion) {
 
 const Vector& SurfaceDynamics::masses() {
   return masses_.get({problem_.energy_revision, mass_revision_}, [&]() -> Vector {
-    if (!motion_ || motion_->masses.size() == 0) return Vector::Ones(problem_.energy_points.rows());
-    return entries_of(motion_->masses, problem_.energy_samples);
+    const bool alike = !motion_ || motion_->masses.size() == 0;
+    const Vector own = alike
+                           ? Vector::Ones(problem_.energy_points.rows())
+                           : entries_of(problem_.at_all("masses", motion_->masses), problem_.energy_samples);
+    const Vector areas = problem_.energy_areas();
+    return areas.size() > 0 ? Vector(own.cwiseProduct(areas)) : own;
   });
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "solve/radial/problem.h"
 
+#include <numeric>
+
 #include "core/random.h"
 #include "sampling/nearest_sample.h"
 #include "sampling/sample_choice.h"
@@ -18,6 +20,10 @@ constexpr Index worth_threads = 1000000;
 constexpr int worth_two_layers = 400;
 /// A place of the mesh that is no farther from a sample, in cube units, is that sample.
 constexpr double same_place = 1e-9;
+/// Samples of the energy that a fine region gets besides, as a share of all others, and all of them together,
+/// but each at least so many.
+constexpr double share_in_region = 0.1, share_in_all = 0.3;
+constexpr Index least_in_region = 200;
 
 }  // namespace
 
@@ -40,6 +46,7 @@ RadialProblem::RadialProblem(const SurfaceSamples& surface, const LiveOptions& s
   const std::vector<Index> chosen = stratified(shape->order, options.samples, random);
   add_energy_samples(chosen);
   add_energy_samples(missed_rows(samples.points, chosen));
+  for (const FineRegion& region : shape->fine_regions) refine(region);
   std::vector<RadialScale> scales;
   if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
   scales.push_back({options.fine_centers, options.fine_radius_factor, two_layers});
@@ -61,13 +68,39 @@ void RadialProblem::add_energy_samples(const std::vector<Index>& rows) {
   ++energy_revision;
 }
 
-std::vector<Index> RadialProblem::add_samples(const MeshPlaces& places) {
+void RadialProblem::refine(const FineRegion& region) {
+  const Index before = samples.size();
+  const double share =
+      std::min(share_in_region, share_in_all / static_cast<double>(shape->fine_regions.size()));
+  const Index most = std::max<Index>(least_in_region, static_cast<Index>(share * options.samples));
+  MeshPlaces places;
+  const Index count = std::min<Index>(most, region.points.rows());
+  std::vector<Index> picked;
+  for (Index k = 0; k < count; ++k) picked.push_back(k * region.points.rows() / count);
+  places.points = frame().to_mesh(Points(region.points(picked, Eigen::all)));
+  places.normals = region.normals(picked, Eigen::all);
+  add_samples(places);
+  std::vector<Index> rows(static_cast<std::size_t>(samples.size() - before));
+  std::iota(rows.begin(), rows.end(), before);
+  // The energy stays a mean over the area: all samples of the region share that of the former ones.
+  const std::vector<Index> former = region.rows_on(energy_points);
+  const auto all = static_cast<double>(former.size() + rows.size());
+  const double left = static_cast<double>(former.size()) / all;
+  if (areas.size() == 0) areas = Vector::Ones(samples.size());
+  for (const Index row : rows) areas[row] = left;
+  for (const Index k : former) areas[energy_samples[static_cast<std::size_t>(k)]] *= left;
+  add_energy_samples(rows);
+}
+
+void RadialProblem::add_samples(const MeshPlaces& places) {
   const auto found = nearest_samples(samples.points).closest(frame().to_cube(places.points));
-  std::vector<Index> rows, nearest;
+  std::vector<Index> rows, nearest, like;
   for (Index i = 0; i < places.points.rows(); ++i) {
     if (found.distances[i] < same_place) continue;
     rows.push_back(i);
     nearest.push_back(found.triangles[static_cast<std::size_t>(i)]);
+    const Index added = nearest.back() - given_count();
+    like.push_back(added < 0 ? nearest.back() : alike[static_cast<std::size_t>(added)]);
   }
   const Points points = frame().to_cube(rows_of(places.points, rows));
   const Points normals = rows_of(places.normals, rows);
@@ -87,13 +120,45 @@ std::vector<Index> RadialProblem::add_samples(const MeshPlaces& places) {
       samples.normals.row(i) = (own.dot(near) < 0.0 ? -1.0 : 1.0) * own;
     }
   }
+  repeat(areas);
   repeat(samples.weights);
   repeat(samples.bend_weights);
   repeat(samples.sheet_sizes);
   if (!samples.mesh_indices.empty())
     for (const Index row : nearest)
       samples.mesh_indices.push_back(samples.mesh_indices[static_cast<std::size_t>(row)]);
-  return nearest;
+  alike.insert(alike.end(), like.begin(), like.end());
+}
+
+Vector RadialProblem::at_all(const std::string& argument, const Vector& given) const {
+  if (given.size() == 0) return given;
+  const Index count = given_count();
+  require(given.size() == count, argument, std::to_string(given.size()) + " numbers",
+          "one for each of the " + std::to_string(count) + " samples, or none, is needed");
+  Vector result(samples.size());
+  result << given, entries_of(given, alike);
+  return result;
+}
+
+SurfaceSamples RadialProblem::given_samples() const {
+  SurfaceSamples result = samples;
+  const Index count = given_count();
+  const auto cut = [&](auto& values) {
+    if (values.size() > 0) values.conservativeResize(count);
+  };
+  result.points.conservativeResize(count, Eigen::NoChange);
+  if (result.normals.rows() > 0) result.normals.conservativeResize(count, Eigen::NoChange);
+  cut(result.weights);
+  cut(result.bend_weights);
+  cut(result.sheet_sizes);
+  if (!result.mesh_indices.empty()) result.mesh_indices.resize(static_cast<std::size_t>(count));
+  return result;
+}
+
+Vector RadialProblem::energy_areas() const {
+  if (areas.size() == 0) return areas;
+  const Vector own = entries_of(areas, energy_samples);
+  return own / own.mean();
 }
 
 int RadialProblem::solve_threads() const {

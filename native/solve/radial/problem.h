@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/dependent.h"
@@ -29,9 +30,19 @@ struct RadialProblem {
   const Points& surface() const { return samples.points; }
   const Frame& frame() const { return samples.frame; }
   void add_energy_samples(const std::vector<Index>& rows);
-  /// Adds samples at places of the mesh where none is. Returns the sample nearest to each, whose weights it
-  /// has.
-  std::vector<Index> add_samples(const MeshPlaces& places);
+  /// Adds samples at places of the mesh where none is, with the weights of the samples nearest to them.
+  void add_samples(const MeshPlaces& places);
+  /// Numbers at the samples that were given (none: empty), for all samples: added ones have that of the
+  /// nearest given one. Throws InvalidInput that names the argument for another number of them.
+  Vector at_all(const std::string& argument, const Vector& given) const;
+  /// How many samples were given.
+  Index given_count() const { return samples.size() - static_cast<Index>(alike.size()); }
+  /// The samples as they were given, but for their frame with symmetry, and their weights.
+  SurfaceSamples given_samples() const;
+  /// Relative area that each energy sample stands for, 1 on average; empty: all alike.
+  Vector energy_areas() const;
+  /// Adds samples of the energy in a fine region.
+  void refine(const FineRegion& region);
   /// Threads of a solve; 1 for a small problem.
   int solve_threads() const;
 
@@ -43,6 +54,8 @@ struct RadialProblem {
   RadialBasis basis;
   SurfaceStiffness stiffness;         ///< λ without the samples' own bend weights
   std::vector<Index> energy_samples;  ///< rows of the samples
+  std::vector<Index> alike;           ///< of added samples the given ones that are nearest
+  Vector areas;                       ///< (samples; empty: all 1) relative area that each stands for
   Points energy_points;               ///< (n,3) positions of the energy samples
   Revision energy_revision = 0;       ///< of the energy samples
 };

@@ -146,7 +146,8 @@ void RadialSolver::set_hooks(const RadialHooks& hooks) {
 void RadialSolver::set_weights(const Vector& weights, const Vector& bend_weights) {
   RadialState& s = *state_;
   const ThreadScope threads(s.problem.options.threads);
-  s.problem.samples = with_weights(s.problem.samples, weights, bend_weights);
+  s.problem.samples = with_weights(s.problem.samples, s.problem.at_all("weights", weights),
+                                   s.problem.at_all("bend_weights", bend_weights));
   s.stiffness.update(s.handles.bound());
   if (s.handles.any()) s.precondition(s.preconditioner.inertia);
 }
@@ -156,7 +157,7 @@ void RadialSolver::set_symmetry(SymmetryPlane symmetry, const Progress& progress
   LiveOptions options = s.problem.options;
   if (symmetry == options.symmetry) return;
   options.symmetry = symmetry;
-  RadialSolver next(s.problem.samples, s.handles.handles(), options, progress);
+  RadialSolver next(s.problem.given_samples(), s.handles.handles(), options, progress);
   if (const auto& request = s.style.request())
     next.set_style(request->style, request->strength, request->sharpness, request->weights, request->up);
   next.set_hooks(s.hooks);

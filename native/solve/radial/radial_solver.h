@@ -83,7 +83,7 @@ class ARAPFIELDS_EXPORT RadialSolver {
 
   /// The number of samples at which this field, the current one, folds, and of `places` of the mesh. If there
   /// are any, the places, these samples and the nearly folded ones join the samples of the energy, and the
-  /// fold barrier gets this weight. Weights of samples cannot be set any more after places have joined.
+  /// fold barrier gets this weight.
   Index add_fold_samples(double barrier, const DeformationField& now, const MeshPlaces& places = {});
 
   /// Points (n,3) in mesh coordinates at which tracked() evaluates the field, with precomputed basis values.

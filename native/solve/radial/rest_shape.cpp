@@ -3,6 +3,7 @@
 
 #include "core/random.h"
 #include "fields/mirror.h"
+#include "sampling/nearest_sample.h"
 #include "sampling/sample_choice.h"
 #include "solve/contact/points.h"
 #include "solve/setup.h"
@@ -14,6 +15,10 @@ constexpr Index most_sites = 6000;
 /// Centers' spacing is proportional to the square root of the thickness, clamped below at this fraction of
 /// its median.
 constexpr double least_size = 0.1;
+/// Factor on the centers' spacing in fine regions.
+constexpr double finer_centers = 0.5;
+/// Points of a fine region for each candidate.
+constexpr Index points_a_site = 3;
 /// The random stream that chooses the sites.
 constexpr std::uint64_t site_stream = 2;
 
@@ -34,13 +39,9 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
   const std::vector<Index> missed = missed_rows(samples.points, chosen);
   chosen.insert(chosen.end(), missed.begin(), missed.end());
   sites = rows_of(samples.points, chosen);
-  const Vector thick = thickness->at(sites);
-  layout.sizes = (thick / thickness->median()).cwiseMax(least_size).cwiseSqrt();
   Points normals(0, 3);
-  if (samples.normals.rows() == samples.size()) {
-    normals = rows_of(samples.normals, chosen);
-    layout.inner = sites - thick.asDiagonal() * normals;
-  }
+  if (samples.normals.rows() == samples.size()) normals = rows_of(samples.normals, chosen);
+  lay_out(normals);
   if (axis >= 0) {
     FoldedPoints half = folded(sites, normals, layout, axis);
     sites = std::move(half.points);
@@ -53,26 +54,53 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
   const MayJoin sites_may_join = [&](Index i, Index j) { return may_join(chosen[i], chosen[j]); };
   std::shared_ptr<const InsideSight> sight;
   const MakeSight make_sight = [&] {
-    return sight = std::make_shared<const InsideSight>(*samples.mesh, samples.frame, progress);
+    if (!sight) sight = std::make_shared<const InsideSight>(*samples.mesh, samples.frame, progress);
+    return sight;
   };
   const std::shared_ptr<InteriorEmbedding> made = interior_embedding(
       sites, normals, axis, may_join ? sites_may_join : MayJoin(), samples.mesh ? make_sight : MakeSight());
-  if (made && made->sight) {
-    // Samples and vertices know their sides by the mesh; other points take that of the nearest of them.
-    std::vector<Index> near, near_vertices;
-    const std::vector<SurfaceSide> sides = made->sides_of(samples.points, samples.normals, *sight, &near);
-    std::vector<SurfaceSide> of_vertices =
-        made->sides_of(*samples.mesh, samples.frame, *sight, &near_vertices);
-    Points places(std::ssize(near) + std::ssize(near_vertices), 3);
-    places << rows_of(samples.points, near),
-        samples.frame.to_cube(rows_of(samples.mesh->vertices, near_vertices));
-    std::vector<SurfaceSide> near_sides;
-    for (const Index i : near) near_sides.push_back(sides[static_cast<std::size_t>(i)]);
-    for (const Index i : near_vertices) near_sides.push_back(of_vertices[static_cast<std::size_t>(i)]);
-    made->sight->keep(samples.mesh, std::move(of_vertices));
-    made->sight->set_places(places, std::move(near_sides));
+  if (made && !may_join) {
+    fine_regions = arapfields::fine_regions(samples, *thickness, made->width, progress);
+    if (axis >= 0)
+      std::erase_if(fine_regions,
+                    [&](const FineRegion& region) { return region.points.col(axis).minCoeff() <= 0.0; });
+    if (!fine_regions.empty()) refine(*made, normals, make_sight, axis);
+    progress.check();
   }
+  if (made && made->has_sides())
+    made->look_at(samples.points, samples.normals, samples.mesh, samples.frame, *sight);
   embedding = made;
+}
+
+void RestShape::lay_out(const Points& normals) {
+  const Vector thick = thickness->at(sites);
+  layout.sizes = (thick / thickness->median()).cwiseMax(least_size).cwiseSqrt();
+  if (normals.rows() > 0) layout.inner = sites - thick.asDiagonal() * normals;
+}
+
+void RestShape::refine(InteriorEmbedding& own, Points normals, const MakeSight& make_sight, int axis) {
+  add_parts(own, fine_regions, make_sight, axis);
+  for (const FineRegion& region : fine_regions) {
+    std::vector<Index> rows;
+    for (Index i = 0; i < region.points.rows(); i += points_a_site)
+      if (region.shares[i] > 0.0) rows.push_back(i);
+    const Index before = sites.rows(), more = std::ssize(rows);
+    const auto nearest = nearest_samples(sites).closest(region.points(rows, Eigen::all)).triangles;
+    sites.conservativeResize(before + more, Eigen::NoChange);
+    sites.bottomRows(more) = region.points(rows, Eigen::all);
+    normals.conservativeResize(before + more, Eigen::NoChange);
+    normals.bottomRows(more) = region.normals(rows, Eigen::all);
+    for (const std::int32_t row : nearest) parts.push_back(parts[static_cast<std::size_t>(row)]);
+  }
+  for (std::size_t k = 0, one_sided = fine_regions.size(); axis >= 0 && k < one_sided; ++k)
+    fine_regions.push_back(fine_regions[k].reflected(axis));
+  const auto finer = std::make_shared<LocalThickness>(*thickness);
+  for (const FineRegion& region : fine_regions) finer->refine(region);
+  thickness = finer;
+  lay_out(normals);
+  if (axis >= 0) layout.inner.col(axis) = layout.inner.col(axis).cwiseAbs().eval();
+  for (const FineRegion& region : fine_regions)
+    layout.sizes.array() *= 1.0 - (1.0 - finer_centers) * region.shares_at(sites).array();
 }
 
 std::shared_ptr<const FollowedPlaces> RestShape::followed(const SurfaceSamples& samples,

@@ -9,6 +9,7 @@
 #include "fields/radial_basis.h"
 #include "mesh/surface_samples.h"
 #include "options/choices.h"
+#include "sampling/fine_regions.h"
 #include "sampling/local_thickness.h"
 #include "sampling/parts.h"
 
@@ -31,12 +32,19 @@ struct RestShape {
 
   std::vector<std::uint32_t> order;  ///< spatially coherent permutation of the samples (canonical_order)
   std::shared_ptr<const LocalThickness> thickness;
+  std::vector<FineRegion> fine_regions;  ///< where centers and samples of the energy are denser
   Points sites;              ///< (n,3) candidates for centers; with an axis, reflected to one side
   RadialLayout layout;       ///< relative spacing of centers at the sites, and points below them
   std::vector<Index> parts;  ///< connected part of each site, as parts_of()
   std::shared_ptr<const InteriorEmbedding> embedding;  ///< null: Euclidean distances are used
 
  private:
+  /// The centers' layout at the sites, with their normals (none: empty).
+  void lay_out(const Points& normals);
+  /// Gives the embedding parts at the fine regions, and measures and lays out these anew. With an axis, the
+  /// regions are those of one side, and get their reflections.
+  void refine(InteriorEmbedding& own, Points normals, const MakeSight& make_sight, int axis);
+
   std::uint64_t seed_;
   mutable OneAtATime<std::shared_ptr<const FollowedPlaces>> followed_;
 };

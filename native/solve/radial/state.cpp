@@ -98,6 +98,14 @@ Locality RadialState::locality() {
                                        folded(handles.pairs().sources),
                                        {problem.shape->sites, problem.shape->parts});
   });
+  result.sizes = fine_sizes.get({problem.energy_revision}, [&] {
+    Vector sizes(problem.shape->fine_regions.empty() ? 0 : problem.energy_points.rows());
+    sizes.setOnes();
+    for (const FineRegion& region : problem.shape->fine_regions)
+      sizes.array() *=
+          Eigen::pow(std::min(region.size, 1.0), region.shares_at(problem.energy_points).array());
+    return sizes;
+  });
   return result;
 }
 

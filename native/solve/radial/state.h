@@ -97,6 +97,7 @@ struct RadialState {
   ContactConstraints contact;
   Dependent<std::vector<Index>, 1> holders;   ///< the handle that holds each sample; −1: none
   Dependent<Vector, 2> locality_shares;       ///< of the energy samples (solve/held_parts.h)
+  Dependent<Vector, 1> fine_sizes;            ///< of the fine regions at the energy samples; empty: none
   Dependent<Vector, 1> pin_widths;            ///< width of the shape at each point handle
   Dependent<std::vector<Index>, 1> mirrored;  ///< with symmetry, the sample nearest to each one's reflection
   struct Tried {

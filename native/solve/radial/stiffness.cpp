@@ -224,6 +224,8 @@ void StiffnessTerms::add_samples(const BoundHandles& handles) {
     bending_.array() *= entries_of(problem_.samples.bend_weights, rows).array();
   const Vector all = energy_weights(problem_.samples, handles);
   weights_ = all.size() > 0 ? entries_of(all, rows) : Vector();
+  if (const Vector areas = problem_.energy_areas(); areas.size() > 0)
+    weights_ = weights_.size() > 0 ? Vector(weights_.cwiseProduct(areas)) : areas;
 }
 
 }  // namespace arapfields

@@ -11,9 +11,9 @@ namespace arapfields {
 void StyleTerms::set(const StyleRequest& request) {
   require_range("strength", request.strength, 0, 1e6);
   const Index count = problem_.samples.size();
-  const Vector& weights = request.weights;
-  require(weights.size() == 0 || (weights.size() == count && weights.allFinite() && weights.minCoeff() >= 0),
-          "weights", std::to_string(weights.size()) + " numbers, or negative or non-finite ones",
+  const Vector weights = problem_.at_all("weights", request.weights);
+  require(weights.size() == 0 || (weights.allFinite() && weights.minCoeff() >= 0), "weights",
+          std::to_string(weights.size()) + " numbers, or negative or non-finite ones",
           "one weight ≥ 0 for each of the " + std::to_string(count) + " samples, or none, is needed");
   if (request.strength == 0.0) return clear();
   require(problem_.samples.normals.rows() == count, "samples", "they have no normals",
@@ -32,13 +32,6 @@ void StyleTerms::clear() {
   ++revision_;
 }
 
-void StyleTerms::repeat(const std::vector<Index>& rows) {
-  if (!request_ || request_->weights.size() == 0) return;
-  const Vector added = entries_of(request_->weights, rows);
-  request_->weights.conservativeResize(request_->weights.size() + added.size());
-  request_->weights.tail(added.size()) = added;
-}
-
 const std::optional<WeightedStyle>& StyleTerms::style() {
   return style_.get({problem_.energy_revision, revision_},
                     [&] { return any() ? std::optional(at_samples(*request_)) : std::nullopt; });
@@ -48,7 +41,9 @@ WeightedStyle StyleTerms::at_samples(const StyleRequest& request) const {
   const Points normals = rows_of(problem_.samples.normals, problem_.energy_samples);
   StyleAtSamples style = StyleAtSamples::of(request.style, normals, request.sharpness);
   if (request.weights.size() > 0)
-    style.weights.array() *= entries_of(request.weights, problem_.energy_samples).array();
+    style.weights.array() *=
+        entries_of(problem_.at_all("weights", request.weights), problem_.energy_samples).array();
+  if (const Vector areas = problem_.energy_areas(); areas.size() > 0) style.weights.array() *= areas.array();
   const double weight = style.share(request.strength) * problem_.options.gauss_weight * style.factor;
   return {std::move(style), weight};
 }

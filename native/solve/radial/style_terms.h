@@ -37,8 +37,6 @@ class StyleTerms {
   /// samples without normals.
   void set(const StyleRequest& request);
   void clear();
-  /// Gives samples that were added the weights of these.
-  void repeat(const std::vector<Index>& rows);
 
   bool any() const { return request_.has_value(); }
   const std::optional<StyleRequest>& request() const { return request_; }

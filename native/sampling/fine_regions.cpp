@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sampling/fine_regions.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/parallel.h"
+#include "core/random.h"
+#include "mesh/pieces.h"
+#include "mesh/sample_mesh.h"
+#include "sampling/inner_balls.h"
+#include "sampling/local_thickness.h"
+#include "sampling/nearest_sample.h"
+
+namespace arapfields {
+namespace {
+
+/// A sample is thin where its inner ball has at most this radius, in spacings.
+constexpr double thin_radius = 0.5;
+/// It is looked at within two spacings of places where the local thickness, a mean of many, is less than this.
+constexpr double mean_radius = 1.0;
+/// Rules of the inner balls: those of LocalThickness, with facing witnesses up to so many spacings.
+constexpr double flat_cosine = 0.2, witness_spacings = 0.5;
+/// Two thin samples lie beside each other within so many spacings, if one is in front of the other (the
+/// cosine of the way and the normal is above) and their normals are opposite (the cosine is below).
+constexpr double beside = 1.0, front_cosine = 0.5, facing_cosine = -0.3;
+/// Most thin samples that are looked at, and fewest of a region.
+constexpr Index most_thin = 2000, least_thin = 8;
+/// A region is as large as the box of its thin samples, at most this share of the shape. It counts fully up
+/// to the first of these shares of its size from them, and nothing from the second one; its points end at the
+/// last.
+constexpr double largest_share = 0.5, full_share = 0.25, no_share = 0.75, end_share = 1.0;
+/// Points that are drawn of a region, and the random stream.
+constexpr Index drawn_points = 3000;
+constexpr std::uint64_t draw_stream = 7;
+/// Places farther from all points than so many spacings of theirs have no share.
+constexpr double near_spacings = 4.0;
+
+double diagonal(PointsIn points) {
+  return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
+}
+
+/// Samples of thin parts beside another one.
+std::vector<Index> thin_samples(const SurfaceSamples& samples, const LocalThickness& thickness,
+                                double spacing) {
+  const Points near_places = thickness.thinner_than(mean_radius * spacing);
+  if (near_places.rows() == 0) return {};
+  const Vector away = nearest_distances(near_places, samples.points);
+  std::vector<Index> candidates;
+  for (Index i = 0; i < samples.size(); ++i)
+    if (away[i] < 2.0 * spacing) candidates.push_back(i);
+  if (std::ssize(candidates) > most_thin) {
+    std::vector<Index> fewer;
+    for (Index k = 0; k < most_thin; ++k)
+      fewer.push_back(candidates[static_cast<std::size_t>(k * std::ssize(candidates) / most_thin)]);
+    candidates = std::move(fewer);
+  }
+  if (candidates.empty()) return {};
+  const Vector radii = inner_radii(
+      samples.points(candidates, Eigen::all), samples.normals(candidates, Eigen::all), samples.points,
+      samples.normals,
+      {.most = mean_radius * spacing, .least_cosine = flat_cosine, .near = witness_spacings * spacing});
+  std::vector<Index> thin;
+  for (std::size_t k = 0; k < candidates.size(); ++k)
+    if (radii[static_cast<Index>(k)] < thin_radius * spacing) thin.push_back(candidates[k]);
+  const Points places = samples.points(thin, Eigen::all), normals = samples.normals(thin, Eigen::all);
+  const double reach = beside * spacing;
+  std::vector<char> faces(thin.size());
+  parallel_for(0, places.rows(), 64, [&](Index first, Index last) {
+    for (Index i = first; i < last; ++i)
+      for (Index j = 0; j < places.rows() && faces[static_cast<std::size_t>(i)] == 0; ++j) {
+        const Eigen::RowVector3d way = places.row(j) - places.row(i);
+        faces[static_cast<std::size_t>(i)] = way.squaredNorm() < reach * reach &&
+                                             way.dot(normals.row(i)) > front_cosine * way.norm() &&
+                                             normals.row(i).dot(normals.row(j)) < facing_cosine;
+      }
+  });
+  std::vector<Index> result;
+  for (std::size_t k = 0; k < thin.size(); ++k)
+    if (faces[k] != 0) result.push_back(thin[k]);
+  return result;
+}
+
+/// Single-linkage clusters of points (n,3), in the order of their first ones: rows.
+std::vector<std::vector<Index>> clusters(const Points& points, double reach) {
+  std::vector<bool> taken(static_cast<std::size_t>(points.rows()));
+  std::vector<std::vector<Index>> result;
+  for (Index seed = 0; seed < points.rows(); ++seed) {
+    if (taken[static_cast<std::size_t>(seed)]) continue;
+    taken[static_cast<std::size_t>(seed)] = true;
+    std::vector<Index> members{seed};
+    for (std::size_t k = 0; k < members.size(); ++k)
+      for (Index j = 0; j < points.rows(); ++j)
+        if (!taken[static_cast<std::size_t>(j)] &&
+            (points.row(j) - points.row(members[k])).squaredNorm() < reach * reach) {
+          taken[static_cast<std::size_t>(j)] = true;
+          members.push_back(j);
+        }
+    result.push_back(std::move(members));
+  }
+  return result;
+}
+
+/// The region around thin places: what is connected with them near by.
+FineRegion region_of(const Points& thin, double size, const Points& vertices, const TriangleMesh& mesh,
+                     Random& random) {
+  FineRegion result;
+  result.ball.center = 0.5 * (thin.colwise().minCoeff() + thin.colwise().maxCoeff()).transpose();
+  const double end = end_share * size;
+  result.size = size;
+  result.ball.radius = 0.5 * size + end;
+  std::vector<Index> near;
+  for (Index t = 0; t < mesh.triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k)
+      if ((vertices.row(mesh.triangles(t, k)).transpose() - result.ball.center).norm() < result.ball.radius) {
+        near.push_back(t);
+        break;
+      }
+  const Triangles triangles = mesh.triangles(near, Eigen::all);
+  const std::vector<std::int32_t> pieces = pieces_of({mesh.vertices, triangles});
+  const AreaSampler sampler(vertices, triangles);
+  Points points(drawn_points, 3), normals(drawn_points, 3);
+  std::vector<std::int32_t> piece;
+  for (Index i = 0; i < drawn_points; ++i) {
+    const AreaSampler::Draw draw = sampler.draw(random);
+    points.row(i) = draw.point.transpose();
+    normals.row(i) = sampler.unit_normal(draw.triangle).transpose();
+    piece.push_back(pieces[static_cast<std::size_t>(draw.triangle)]);
+  }
+  std::vector<bool> is_thin(static_cast<std::size_t>(*std::ranges::max_element(pieces)) + 1);
+  for (const std::int32_t row : nearest_samples(points).closest(thin).triangles)
+    is_thin[static_cast<std::size_t>(piece[static_cast<std::size_t>(row)])] = true;
+  std::vector<Index> rows;
+  std::vector<double> shares;
+  const Vector away = nearest_distances(thin, points);
+  for (Index i = 0; i < drawn_points; ++i) {
+    if (!is_thin[static_cast<std::size_t>(piece[static_cast<std::size_t>(i)])] || away[i] > end) continue;
+    const double t = std::clamp((no_share - away[i] / size) / (no_share - full_share), 0.0, 1.0);
+    rows.push_back(i);
+    shares.push_back(t * t * (3.0 - 2.0 * t));
+  }
+  result.points = points(rows, Eigen::all);
+  result.normals = normals(rows, Eigen::all);
+  result.shares = Eigen::Map<const Vector>(shares.data(), std::ssize(shares));
+  result.spacing = std::sqrt(sampler.area() / static_cast<double>(drawn_points));
+  return result;
+}
+
+}  // namespace
+
+std::vector<Index> Ball::rows_inside(PointsIn points) const {
+  std::vector<Index> rows;
+  for (Index i = 0; i < points.rows(); ++i)
+    if ((points.row(i) - center.transpose()).squaredNorm() < radius * radius) rows.push_back(i);
+  return rows;
+}
+
+FineRegion FineRegion::reflected(int axis) const {
+  FineRegion result = *this;
+  result.points.col(axis) *= -1.0;
+  result.normals.col(axis) *= -1.0;
+  result.ball.center[axis] *= -1.0;
+  return result;
+}
+
+std::vector<Index> FineRegion::rows_on(PointsIn places, std::vector<std::int32_t>* nearest) const {
+  const std::vector<Index> near = ball.rows_inside(places);
+  std::vector<Index> result;
+  if (near.empty()) return result;
+  const auto found = nearest_samples(points).closest(places(near, Eigen::all));
+  for (std::size_t k = 0; k < near.size(); ++k) {
+    if (!(found.distances[static_cast<Index>(k)] < near_spacings * spacing)) continue;
+    result.push_back(near[k]);
+    if (nearest != nullptr) nearest->push_back(found.triangles[k]);
+  }
+  return result;
+}
+
+Vector FineRegion::shares_at(PointsIn places) const {
+  Vector result = Vector::Zero(places.rows());
+  std::vector<std::int32_t> nearest;
+  const std::vector<Index> rows = rows_on(places, &nearest);
+  for (std::size_t k = 0; k < rows.size(); ++k) result[rows[k]] = shares[nearest[k]];
+  return result;
+}
+
+std::vector<FineRegion> fine_regions(const SurfaceSamples& samples, const LocalThickness& thickness,
+                                     double spacing, const Progress& progress) {
+  if (!samples.mesh || samples.normals.rows() != samples.size()) return {};
+  const std::vector<Index> thin = thin_samples(samples, thickness, spacing);
+  progress.check();
+  const Points places = samples.points(thin, Eigen::all);
+  const double extent = diagonal(samples.points);
+  Random random(0, draw_stream);
+  std::vector<FineRegion> result;
+  Points vertices(0, 3);
+  for (const std::vector<Index>& cluster : clusters(places, beside * spacing)) {
+    const Points own = places(cluster, Eigen::all);
+    const double size = diagonal(own);
+    if (std::ssize(cluster) < least_thin || size > largest_share * extent) continue;
+    if (vertices.rows() == 0) vertices = samples.frame.to_cube(samples.mesh->vertices);
+    result.push_back(region_of(own, size, vertices, *samples.mesh, random));
+    progress.check();
+  }
+  return result;
+}
+
+}  // namespace arapfields
