@@ -163,6 +163,7 @@ py::typing::Dict<py::str, FieldArray> arrays_of(const RadialField& field) {
     arrays["embedded"] = basis.embedded, arrays["nodes"] = embedding.nodes;
     arrays["values"] = embedding.values, arrays["slopes"] = embedding.slopes;
     arrays["width"] = Vector::Constant(1, embedding.width);
+    for (const EmbeddingPart& part : embedding.parts) arrays["fine_nodes"] = part.embedding.nodes;
   }
   if (field.influence()) {
     arrays["places"] = field.influence()->places(), arrays["reaches"] = field.influence()->reaches();
@@ -184,7 +185,8 @@ Copies of all numbers that make the field, to evaluate it elsewhere; in the coor
 
 f(x) = Σ coefficients[m] φ(|x − centers[m]|² / radii[m]²) + affine[0] + x · affine[1:], φ(s) = (1 − s/6)₊⁶.
 Where distances are interior, |ψ(x) − embedded[m]|² joins the squared distance. ψ is the mean of
-values[i] + slopes[i].reshape(3, 3) · (x − nodes[i]), weighed by exp(−|x − nodes[i]|² / width²).
+values[i] + slopes[i].reshape(3, 3) · (x − nodes[i]), weighed by exp(−|x − nodes[i]|² / width²). Where there
+are `fine_nodes`, those of fine parts such as a figure's fingers, ψ is another one there, which these do not give.
 Handles with a reach add their places and reaches, as `deform` confines what they move.)");
   py::class_<MotionState>(module, "MotionState", R"(
 Position, velocity and acceleration of a LiveDeformer: with the targets, all that its next step depends on.

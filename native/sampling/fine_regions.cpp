@@ -16,16 +16,17 @@ namespace arapfields {
 namespace {
 
 /// A sample is thin where its inner ball has at most this radius, in spacings.
-constexpr double thin_radius = 0.5;
-/// It is looked at within two spacings of places where the local thickness, a mean of many, is less than this.
-constexpr double mean_radius = 1.0;
+constexpr double thin_radius = 1.0;
+/// It is looked at within two spacings of places where the local thickness, a mean of many, is less than
+/// this.
+constexpr double mean_radius = 1.5;
 /// Rules of the inner balls: those of LocalThickness, with facing witnesses up to so many spacings.
 constexpr double flat_cosine = 0.2, witness_spacings = 0.5;
 /// Two thin samples lie beside each other within so many spacings, if one is in front of the other (the
 /// cosine of the way and the normal is above) and their normals are opposite (the cosine is below).
-constexpr double beside = 1.0, front_cosine = 0.5, facing_cosine = -0.3;
+constexpr double beside = 1.0, front_cosine = 0.2, facing_cosine = -0.3;
 /// Most thin samples that are looked at, and fewest of a region.
-constexpr Index most_thin = 2000, least_thin = 8;
+constexpr Index most_thin = 8000, least_thin = 8;
 /// A region is as large as the box of its thin samples, at most this share of the shape. It counts fully up
 /// to the first of these shares of its size from them, and nothing from the second one; its points end at the
 /// last.
@@ -55,29 +56,31 @@ std::vector<Index> thin_samples(const SurfaceSamples& samples, const LocalThickn
       fewer.push_back(candidates[static_cast<std::size_t>(k * std::ssize(candidates) / most_thin)]);
     candidates = std::move(fewer);
   }
-  if (candidates.empty()) return {};
-  const Vector radii = inner_radii(
-      samples.points(candidates, Eigen::all), samples.normals(candidates, Eigen::all), samples.points,
-      samples.normals,
-      {.most = mean_radius * spacing, .least_cosine = flat_cosine, .near = witness_spacings * spacing});
-  std::vector<Index> thin;
-  for (std::size_t k = 0; k < candidates.size(); ++k)
-    if (radii[static_cast<Index>(k)] < thin_radius * spacing) thin.push_back(candidates[k]);
-  const Points places = samples.points(thin, Eigen::all), normals = samples.normals(thin, Eigen::all);
+  const Points places = samples.points(candidates, Eigen::all),
+               normals = samples.normals(candidates, Eigen::all);
   const double reach = beside * spacing;
-  std::vector<char> faces(thin.size());
+  std::vector<char> faces(candidates.size());
   parallel_for(0, places.rows(), 64, [&](Index first, Index last) {
     for (Index i = first; i < last; ++i)
       for (Index j = 0; j < places.rows() && faces[static_cast<std::size_t>(i)] == 0; ++j) {
         const Eigen::RowVector3d way = places.row(j) - places.row(i);
-        faces[static_cast<std::size_t>(i)] = way.squaredNorm() < reach * reach &&
-                                             way.dot(normals.row(i)) > front_cosine * way.norm() &&
+        const double square = way.squaredNorm();
+        faces[static_cast<std::size_t>(i)] = square < reach * reach &&
+                                             way.dot(normals.row(i)) > front_cosine * std::sqrt(square) &&
                                              normals.row(i).dot(normals.row(j)) < facing_cosine;
       }
   });
+  std::vector<Index> opposite;
+  for (std::size_t k = 0; k < candidates.size(); ++k)
+    if (faces[k] != 0) opposite.push_back(candidates[k]);
+  if (opposite.empty()) return {};
+  const Vector radii = inner_radii(
+      samples.points(opposite, Eigen::all), samples.normals(opposite, Eigen::all), samples.points,
+      samples.normals,
+      {.most = mean_radius * spacing, .least_cosine = flat_cosine, .near = witness_spacings * spacing});
   std::vector<Index> result;
-  for (std::size_t k = 0; k < thin.size(); ++k)
-    if (faces[k] != 0) result.push_back(thin[k]);
+  for (std::size_t k = 0; k < opposite.size(); ++k)
+    if (radii[static_cast<Index>(k)] < thin_radius * spacing) result.push_back(opposite[k]);
   return result;
 }
 

@@ -61,7 +61,7 @@ def test_any_reader_of_safetensors_opens_them(name, examples):
     assert loaded.keys() == arrays.keys()
     assert all(np.array_equal(loaded[key], arrays[key]) for key in arrays)
     with safetensors.safe_open(examples[name], "np") as file:
-        assert file.metadata()["format"] == "arapfields" and file.metadata()["version"] == "3"
+        assert file.metadata()["format"] == "arapfields" and file.metadata()["version"] == "4"
     assert texts["kind"] == ("sdf" if name == "sdf" else "field")
 
 

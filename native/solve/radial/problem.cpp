@@ -134,7 +134,7 @@ Vector RadialProblem::at_all(const std::string& argument, const Vector& given) c
   if (given.size() == 0) return given;
   const Index count = given_count();
   require(given.size() == count, argument, std::to_string(given.size()) + " numbers",
-          "one for each of the " + std::to_string(count) + " samples, or none, is needed");
+          "one weight for each of the " + std::to_string(count) + " samples, or none, is needed");
   Vector result(samples.size());
   result << given, entries_of(given, alike);
   return result;

@@ -67,8 +67,17 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
     if (!fine_regions.empty()) refine(*made, normals, make_sight, axis);
     progress.check();
   }
-  if (made && made->has_sides())
-    made->look_at(samples.points, samples.normals, samples.mesh, samples.frame, *sight);
+  if (made && made->has_sides()) {
+    Points known = samples.points, directions = samples.normals;
+    for (const FineRegion& region : fine_regions) {  // some of these are samples of the energy
+      const Index before = known.rows(), count = before + region.points.rows();
+      known.conservativeResize(count, Eigen::NoChange);
+      known.bottomRows(region.points.rows()) = region.points;
+      directions.conservativeResize(count, Eigen::NoChange);
+      directions.bottomRows(region.points.rows()) = region.normals;
+    }
+    made->look_at(known, directions, samples.mesh, samples.frame, *sight);
+  }
   embedding = made;
 }
 

@@ -36,7 +36,7 @@ def read(path):
 def header_of(texts, arrays):
     """The header as a dict, arrays in the dict's order. All versions become version 1, without checksum."""
     texts = {k: v if isinstance(v, str) else json.dumps(v) for k, v in texts.items() if k != "checksum"}
-    if texts.get("version") in ("2", "3"):
+    if texts.get("version") in ("2", "3", "4"):
         texts["version"] = "1"
     header, offset = {"__metadata__": texts}, 0
     for name, array in arrays.items():
