@@ -427,6 +427,7 @@ OPERATORS = (
     "ADD_HANDLE",
     "SET_REST",
     "RESET_HANDLE",
+    "KEY_HANDLE",
     "DEFORM",
     "LIVE",
     "STYLIZE",
