@@ -50,11 +50,12 @@ class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
 
 
 def keyframe_button(layout, source):
-    """Draws the button that keys the pose, and how a pose is animated, while nothing of it is."""
+    """Draws the button that keys the pose, and how a pose is animated, until there are two frames of it."""
     if not empties.used(source):
         return
     layout.operator(Op.KEY_HANDLE, text="Insert Keyframe", icon="KEY_HLT")
-    if frame_range.animation_range(source, "DEFORM") is None:
+    first, last = frame_range.animation_range(source, "DEFORM") or (0, 0)
+    if first == last:
         hint = translated("Insert a keyframe, go to another frame, move the handles and insert the next")
         wrapped(layout, hint, icon="INFO")
 

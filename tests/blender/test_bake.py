@@ -407,6 +407,8 @@ def test_the_section_says_what_a_bake_lacks():
     shown = " ".join(animate_section())
     assert "Insert Keyframe" in shown and "Insert a keyframe, go to another frame" in shown
     assert "Save the .blend first" in shown
+    bpy.ops.arapfields.key_handle()
+    assert "go to another frame" in " ".join(animate_section())
     bpy.context.scene.frame_set(5)
     moving.location.z = 0.4
     bpy.ops.arapfields.key_handle()
