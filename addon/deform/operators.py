@@ -59,7 +59,7 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         if scaled is not None:
             self.warnings.append(about(source.name, scaled))
 
-        kept = UserError("{name} keeps its live pose: a finer one would take the whole shape along", source)
+        kept = UserError("{name} keeps its live pose: a finer solve would end in another", source)
 
         def solve(tracker, rest, samples, weight):
             natives = native_handles(af, handles, rest, samples)
