@@ -43,7 +43,6 @@ class ARAPFIELDS_OT_deform(SolveOperator, bpy.types.Operator):
         values = effective_values(DEFORM, settings_of(source).deform, self)
         af = native.library()
         options = options_of("deform", values)
-        options.locality_limit = af.LiveOptions().locality_limit  # or a pose that is finished would leap
         space = symmetry.space_for(source, world_matrix(source), values["symmetry"])
         handles = empties.solve_handles(source, space, weights)
         beside = symmetry.beside(source, values["symmetry"])

@@ -62,7 +62,7 @@ def test_a_pose_that_is_finished_is_the_one_that_was_shown(height):
     assert not sessions.live and body.arapfields.moved_by == "DEFORM"
     away = np.linalg.norm(scenes.world_points(body) - live, axis=1) / size
     assert away.mean() < 0.003 and away.max() < 0.03
-    assert ("keeps its live pose" in str(jobs.messages())) == (height > 0.3)
+    assert "keeps its live pose" in str(jobs.messages())
     bpy.ops.arapfields.deform()  # anew, with nothing live to keep
     assert "keeps its live pose" not in str(jobs.messages())
 
