@@ -23,6 +23,7 @@ class ARAPFIELDS_MT_object(bpy.types.Menu):
         layout.operator(Op.CARRY, icon="LINKED")
         layout.operator(Op.SET_REST, icon="PINNED")
         layout.operator(Op.RESET_HANDLE, icon="LOOP_BACK")
+        layout.operator(Op.KEY_HANDLE, icon="KEY_HLT")
         layout.separator()
         layout.operator(Op.DEFORM, icon="MOD_SIMPLEDEFORM")
         icon = "PAUSE" if sessions.is_live(source, "DEFORM") else "PLAY"

@@ -49,6 +49,7 @@ class Op(StrEnum):
     ADD_BONES = "arapfields.add_bones"
     SET_REST = "arapfields.set_rest"
     RESET_HANDLE = "arapfields.reset_handle"
+    KEY_HANDLE = "arapfields.key_handle"
     REMOVE_HANDLE = "arapfields.remove_handle"
     DELETE_LEFT = "arapfields.delete_left"
     RESIZE_HANDLE = "arapfields.resize_handle"

@@ -16,7 +16,7 @@ from ..blender.language import translated
 from ..blender.object_references import settings_of
 from ..blender.point_data import points_of
 from ..carried import points
-from ..core.errors import UserError, as_user_error
+from ..core.errors import UserError, as_user_error, refuse
 from ..core.runtime import native
 from ..core.runtime.jobs import Pause
 from ..field_modifier import cache_modifier, node_group
@@ -168,11 +168,17 @@ def file_name(source, scene, folder):
     return joined(*parts)
 
 
+def unsaved(folder):
+    """UserError if a folder is the .blend's own, and that is not saved; else None."""
+    if bpy.data.filepath or not folder.startswith("//"):
+        return None
+    return UserError("Save the .blend first, or choose a folder: the cache lies beside it")
+
+
 def cache_path(source, scene, suffix, folder, filepath=""):
     """The absolute path of an object's cache, whose folder may be new; UserError if it cannot be used."""
     shown = filepath or folder
-    if shown.startswith("//") and not bpy.data.filepath:
-        raise UserError("Save the .blend first, or choose a folder: the cache lies beside it")
+    refuse(unsaved(shown))
     path = Path(os.path.normpath(bpy.path.abspath(shown)))
     if not filepath:
         path = path / f"{file_name(source, scene, path)}{suffix}"

@@ -6,9 +6,11 @@ from ..blender.language import translated
 from ..blender.point_data import points_of
 from ..blender.section import Section, draw_settings, job_button, modifier_row, note, wrapped
 from ..blender.splat_layouts import holds_splats
+from ..handles import empties
 from ..names import Op
 from ..solver import frame_range
 from . import caches
+from .bake_job import effective_kind, refusal_of
 
 
 class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
@@ -19,6 +21,7 @@ class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
     def fill(self, context, source, settings):
         layout, bake = self.layout, settings.bake
         is_scan = holds_splats(source)
+        keyframe_button(layout, source)
         draw_settings(layout, bake, "splat_format" if is_scan else "format", "kind", "range")
         if bake.range == "CUSTOM":
             column = layout.column(align=True)
@@ -30,6 +33,11 @@ class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
         if not is_scan:
             wrapped(layout, weight(context, source, bake))
         job_button(layout, Op.BAKE, "REC")
+        note(
+            layout,
+            refusal_of(source, effective_kind(source)),
+            caches.unsaved(bake.folder) if folders else None,
+        )
         if is_scan:
             layout.operator(Op.EXPORT_SPLATS, icon="EXPORT")
             return
@@ -39,6 +47,17 @@ class ARAPFIELDS_PT_animation(Section, bpy.types.Panel):
             layout.prop(modifier, "filepath", text="")
             note(layout, caches.problem(source))
         layout.menu("ARAPFIELDS_MT_export", icon="EXPORT")
+
+
+def keyframe_button(layout, source):
+    """Draws the button that keys the pose, and how a pose is animated, until there are two frames of it."""
+    if not empties.used(source):
+        return
+    layout.operator(Op.KEY_HANDLE, text="Insert Keyframe", icon="KEY_HLT")
+    first, last = frame_range.animation_range(source, "DEFORM") or (0, 0)
+    if first == last:
+        hint = translated("Insert a keyframe, go to another frame, move the handles and insert the next")
+        wrapped(layout, hint, icon="INFO")
 
 
 def weight(context, source, bake):

@@ -79,8 +79,13 @@ class Guided:
 
     @classmethod
     def description(cls, context, properties):
-        page = translated("Guide: {page}", page=translated(LABELS[cls.guide]))
-        return f"{translated(cls.__doc__)}.\n{page}"
+        return with_page(translated(cls.__doc__), cls.guide)
+
+
+def with_page(text, guide):
+    """A tooltip that names the page of the guide."""
+    page = translated("Guide: {page}", page=translated(LABELS[guide]))
+    return f"{text}.\n{page}"
 
 
 def begin(classes):

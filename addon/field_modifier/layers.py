@@ -88,8 +88,13 @@ def can_stay(source):
     settings, field = settings_of(source), modifier_stack.find(source)
     if field is None or settings.moved_by not in STAYING or source.mode == "EDIT" or source.library:
         return False
-    further = settings.carried or settings.carried_by or settings.field_helper or holds_splats(source)
-    return not further and field.show_viewport and not cache_modifier.is_playing(source)
+    return is_alone(source) and field.show_viewport and not cache_modifier.is_playing(source)
+
+
+def is_alone(source):
+    """Whether nothing of a source keeps its results from being layers."""
+    settings = settings_of(source)
+    return not (settings.carried or settings.carried_by or settings.field_helper or holds_splats(source))
 
 
 def stays_below(source, kind):
@@ -109,6 +114,8 @@ def replaced(source, kind):
     by = settings_of(source).moved_by.replace(POSED, "STYLIZE")
     if modifier_stack.find(source) is None or by in ("", kind) or stays_below(source, kind):
         return None
+    if by == "DEFORM" and is_alone(source):
+        return UserError("{name}: this takes the pose off; press Pose afterwards to have it again", source)
     operation = {"DEFORM": "Deform", **STAYING}[by]
     return UserError("{name}: this replaces the result of {operation}", source, operation=operation)
 

@@ -3,17 +3,17 @@ import bpy
 
 from ..blender import vertex_groups
 from ..blender.language import translated
-from ..blender.object_references import select_alone, settings_of, source_of
+from ..blender.object_references import refusal_of_linked, select_alone, settings_of, source_of
 from ..blender.property_definitions import choice, flag, text
 from ..blender.references import takes_references
 from ..blender.source_operator import SourceOperator
-from ..core.errors import UserError
+from ..core.errors import UserError, refuse
 from ..core.geometry.handles import nothing_held
 from ..core.geometry.spaces import space_of
 from ..core.runtime import native
 from ..core.settings.choices import BONES, EMPTY_KINDS, HANDLE_PLACES
 from ..field_modifier import layers
-from . import bones, empties, held_counts, movers
+from . import bones, empties, held_counts, keyframes, movers
 
 
 class HandleOperator(SourceOperator):
@@ -186,6 +186,22 @@ class ARAPFIELDS_OT_reset_handle(RestOperator, bpy.types.Operator):
         return translated("Handles moved back: {count}", count=len(entries))
 
 
+class ARAPFIELDS_OT_key_handle(HandleOperator, bpy.types.Operator):
+    """Insert keyframes for the location and rotation of all handles but the anchors, on the current frame"""
+
+    bl_label = "Insert Keyframe of Handles"
+    guide = "animation"
+
+    def change(self, context, source):
+        used = empties.used(source)
+        entries = [entry for entry in used if not entry.anchor] or used
+        for entry in entries:
+            refuse(refusal_of_linked(movers.mover_of(entry)))
+        for entry in entries:
+            keyframes.insert(entry)
+        return translated("Handles with a keyframe: {count}", count=len(entries))
+
+
 class ARAPFIELDS_OT_remove_handle(HandleOperator, bpy.types.Operator):
     """Take the selected handles off the list, or the one that is chosen in it"""
 
@@ -212,5 +228,6 @@ CLASSES = [
     ARAPFIELDS_OT_mirror_handle,
     ARAPFIELDS_OT_set_rest,
     ARAPFIELDS_OT_reset_handle,
+    ARAPFIELDS_OT_key_handle,
     ARAPFIELDS_OT_remove_handle,
 ]

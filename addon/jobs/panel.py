@@ -18,7 +18,7 @@ def remarks(source):
     shown = modifier_stack.shown_before(source, settings_of(source).in_place)
     after = [m.name for m in modifier_stack.shown_before(source, False) if m not in shown]
     if shown:
-        yield translated("Works on the shape that {names} make", names=", ".join(m.name for m in shown))
+        yield translated("Works on the shape after {names}", names=", ".join(m.name for m in shown))
     if after:
         yield translated("Works before {names}", names=", ".join(after))
     if shape_keys_of(source.data):

@@ -5,7 +5,7 @@ from ..blender import modifier_stack, references
 from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
 from ..blender.property_definitions import choice
-from ..blender.source_operator import ReportingOperator, SourceOperator
+from ..blender.source_operator import ReportingOperator, SourceOperator, with_page
 from ..core.errors import UserError, refuse
 from ..core.runtime import jobs
 from ..core.settings.choices import LIVE_KINDS, RESULT_KINDS
@@ -26,6 +26,15 @@ class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
     bl_options = {"UNDO"}
 
     kind: choice(LIVE_KINDS, "Kind", "What the shape follows", options={"SKIP_SAVE"})
+
+    @classmethod
+    def description(cls, context, properties):
+        kind = getattr(properties, "kind", "")
+        if kind == "STYLIZE":
+            return with_page(translated("Show the style on the object while its settings change"), "stylize")
+        if kind == "DEFORM":
+            return with_page(translated("Let the shape follow its handles while they move"), "deform")
+        return super().description(context, properties)
 
     @classmethod
     def obstacle(cls, context):

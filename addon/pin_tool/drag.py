@@ -8,6 +8,7 @@ from ..blender.language import translated
 from ..blender.object_references import ObjectReference, settings_of
 from ..core.runtime import jobs
 from ..field_modifier import layers, motion
+from ..handles import keyframes
 from ..live import live_modifier, sessions
 from . import pins
 
@@ -145,9 +146,7 @@ class Drag:
 def insert_keys(context, empty):
     """Keyframes the handle if Auto Keying is on."""
     if context.scene.tool_settings.use_keyframe_insert_auto:
-        turn = {"QUATERNION": "quaternion", "AXIS_ANGLE": "axis_angle"}.get(empty.rotation_mode, "euler")
-        for path in ("location", f"rotation_{turn}"):
-            empty.keyframe_insert(path)
+        keyframes.insert(pins.entry_of(empty))
 
 
 def begin_live(context, source, way=None):

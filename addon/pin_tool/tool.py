@@ -20,7 +20,7 @@ class ARAPFIELDS_TOOL_pin(bpy.types.WorkSpaceTool):
     bl_label = "ARAP Pin"
     bl_description = (
         "Pin the active object and drag it: the shape follows, as rigid as it can be. "
-        "Shift-click: anchor. Ctrl-click or X: delete. R or the ring: turn. F: radius. "
+        "Shift-click: anchor. Ctrl-click or X: delete. R or the ring: turn. I: keyframe. F: radius. "
         "Ctrl-wheel in a drag: reach. Alt-click: pin another object"
     )
     bl_icon = ICON
@@ -44,6 +44,7 @@ class ARAPFIELDS_TOOL_pin(bpy.types.WorkSpaceTool):
         (Op.PIN_DELETE, {"type": "X", "value": "PRESS"}, None),
         (Op.PIN_DELETE, {"type": "DEL", "value": "PRESS"}, None),
         (Op.PIN_TURN, {"type": "R", "value": "PRESS"}, None),
+        (Op.KEY_HANDLE, {"type": "I", "value": "PRESS"}, None),  # Blender's I would key the mesh
         (
             "wm.radial_control",
             {"type": "F", "value": "PRESS"},

@@ -341,7 +341,7 @@ def placement_refusal(source):
 
 def replaced_by(source, kind):
     """UserError that says which result a run of that kind replaces; else None."""
-    is_lost = not settings_of(source).live_kind and settings_of(source).result != "NEW"
+    is_lost = settings_of(source).live_kind != kind and settings_of(source).result != "NEW"
     return layers.replaced(source, kind) if is_lost else None
 
 

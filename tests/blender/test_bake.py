@@ -396,6 +396,30 @@ def test_an_unsaved_file_asks_for_a_place():
     assert bpy.data.objects["Bar"].modifiers[0].filepath == path
 
 
+def animate_section():
+    return drawn()["ARAPFIELDS_PT_animation"]
+
+
+def test_the_section_says_what_a_bake_lacks():
+    scenes.bar()
+    assert "Drag a pin or add a handle" in " ".join(animate_section())
+    bar, _, moving = scenes.bar_with_handles("Other")
+    shown = " ".join(animate_section())
+    assert "Insert Keyframe" in shown and "Insert a keyframe, go to another frame" in shown
+    assert "Save the .blend first" in shown
+    bpy.ops.arapfields.key_handle()
+    assert "go to another frame" in " ".join(animate_section())
+    bpy.context.scene.frame_set(5)
+    moving.location.z = 0.4
+    bpy.ops.arapfields.key_handle()
+    shown = " ".join(animate_section())
+    assert "Insert Keyframe" in shown and "go to another frame" not in shown
+    bar.arapfields.bake.format = "KEYS"
+    assert "Save the .blend" not in " ".join(animate_section())
+    bar.arapfields.bake.format, bar.arapfields.bake.folder = "PC2", tempfile.mkdtemp()
+    assert "Save the .blend" not in " ".join(animate_section())
+
+
 # A bake of a large mesh: what memory it takes, and whether a Blender without the extension plays it.
 
 SIDE, FRAMES = 500, 40  # 250,000 vertices; 120 MB of frames

@@ -14,9 +14,9 @@ if IN_BLENDER:
     from mathutils import Matrix
     from support.blender import scenes
     from support.blender.baking import animated, at, saved_animation
-    from support.blender.live import step
+    from support.blender.live import pin, step
     from support.blender.stacks import add_modifier, local_points
-    from support.blender.wraps import rigged_bar
+    from support.blender.wraps import rigged_bar, rigged_character
 
     from addon import lifecycle
     from addon.blender import host, modifier_stack
@@ -45,6 +45,26 @@ def test_the_moved_end_follows_and_the_held_end_stays():
     assert np.abs(shift[before[:, 0] < -0.8]).max() < 0.08
     assert np.abs(shift[before[:, 0] > 0.8] - [0, 0, 0.4]).max() < 0.12
     assert np.array_equal(scenes.world_points(bar), before)
+
+
+@pytest.mark.parametrize("height", [0.25, 0.37])
+def test_a_pose_that_is_finished_is_the_one_that_was_shown(height):
+    """A raised hand drew the whole body up to it."""
+    body, _ = rigged_character()
+    scenes.activate(body)
+    rest = scenes.world_points(body)
+    size, hand = np.ptp(rest, axis=0).max(), rest[rest[:, 0].argmax()]
+    pin(body, hand, 0.05 * size, target=hand + size * np.array((-0.15, 0, height)))
+    step(refined=True)
+    live = scenes.world_points(body)
+    assert np.linalg.norm(live - rest, axis=1).mean() < 0.03 * size
+    assert bpy.ops.arapfields.deform() == {"FINISHED"}
+    assert not sessions.live and body.arapfields.moved_by == "DEFORM"
+    away = np.linalg.norm(scenes.world_points(body) - live, axis=1) / size
+    assert away.mean() < 0.003 and away.max() < 0.03
+    assert "keeps its live pose" in str(jobs.messages())
+    bpy.ops.arapfields.deform()  # anew, with nothing live to keep
+    assert "keeps its live pose" not in str(jobs.messages())
 
 
 def test_unmoved_handles_give_the_shape_itself():

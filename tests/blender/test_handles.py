@@ -16,12 +16,14 @@ if IN_BLENDER:
     from support.blender.panels import drawn, listed
     from support.blender.skins import rigged_bar
 
+    from addon.blender.evaluation import curves_of
     from addon.blender.object_references import owner_of, source_of
     from addon.core.geometry.spaces import rigid_motion, space_of
     from addon.handles import empties
     from addon.handles.empties import name_for
     from addon.live import sessions
     from addon.pin_tool.pins import handles_in_view
+    from addon.solver.frame_range import animation_range
 
 pytestmark = pytest.mark.in_blender
 
@@ -38,6 +40,39 @@ def test_selected_empties_become_handles_and_anchors_at_first():
     assert [h.is_anchor for h in handles] == [True, False]
     assert all(entry.inside > 0 for entry in bar.arapfields.handles)
     assert fixed.arapfields.handle_of == bar and fixed.empty_display_type == "CUBE"
+
+
+def test_a_pose_is_keyed_on_the_frame_that_is_shown():
+    bar, fixed, moving = scenes.bar_with_handles()
+    bar.arapfields.handles[0].anchor = True
+    for frame, height in ((1, 0.0), (20, 0.5)):
+        bpy.context.scene.frame_set(frame)
+        moving.location.z = height
+        assert bpy.ops.arapfields.key_handle() == {"FINISHED"}
+    bpy.context.scene.frame_set(10)
+    assert 0.1 < moving.location.z < 0.4
+    assert fixed.animation_data is None  # an anchor
+    assert {curve.data_path for curve in curves_of(moving.animation_data.action)} == {
+        "location",
+        "rotation_euler",
+    }
+    assert tuple(animation_range(bar, "DEFORM")) == (1.0, 20.0)
+
+
+def test_the_pose_of_bones_that_are_handles_is_keyed():
+    bar, rig = rigged_bar()
+    scenes.activate(rig, bar)
+    bpy.ops.arapfields.add_bones()
+    bpy.ops.arapfields.key_handle()
+    names = {entry.bone for entry in bar.arapfields.handles}
+    keyed = {curve.data_path for curve in curves_of(rig.animation_data.action)}
+    assert names and all(f'pose.bones["{name}"].location' in keyed for name in names)
+
+
+def test_without_handles_no_pose_is_keyed():
+    scenes.bar()
+    with pytest.raises(RuntimeError, match="The object has no handle"):
+        bpy.ops.arapfields.key_handle()
 
 
 def test_without_empties_one_is_made_at_the_cursor():

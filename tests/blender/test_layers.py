@@ -9,7 +9,7 @@ import arapfields
 
 if IN_BLENDER:
     import bpy
-    from support.blender import scenes, wraps
+    from support.blender import panels, scenes, wraps
     from support.blender.live import WAIT, pin, state, step
     from support.blender.stacks import QUICK, SAME, STYLE, structure, styled, with_handles
 
@@ -160,10 +160,27 @@ def test_a_style_that_is_changed_takes_off_what_lies_over_it(fails):
             arapfields.stylize = stylize
     else:
         assert bpy.ops.arapfields.stylize(**STYLE) == {"FINISHED"}
-        assert "Bar: this replaces the result of Deform" in str(jobs.messages())
+        assert "Bar: this takes the pose off; press Pose afterwards to have it again" in str(jobs.messages())
         assert np.abs(scenes.world_points(bar) - shape).max() < SAME and len(bar.modifiers) == 1
         assert bpy.ops.arapfields.deform(**QUICK) == {"FINISHED"}
     assert np.abs(scenes.world_points(bar) - moved).max() < SAME and structure(bar) == before
+
+
+def test_before_a_style_is_made_the_panel_says_that_it_takes_a_live_pose_off():
+    bar, _, _ = styled()
+    with_handles(bar).location.z += 0.4
+    bpy.ops.arapfields.live(kind="DEFORM")
+    step(refined=True)
+    shown = " ".join(panels.drawn()["ARAPFIELDS_PT_stylize"])
+    assert "this takes the pose off" in shown
+    jobs.forget_messages()
+    bpy.ops.arapfields.stylize(**STYLE)
+    assert "this takes the pose off" in str(jobs.messages())
+    bpy.ops.arapfields.live(kind="DEFORM")
+    step(refined=True)
+    shown = panels.drawn()
+    assert "this " not in " ".join(shown["ARAPFIELDS_PT_deform"])
+    assert len(bar.modifiers) == 2  # the pose lies on the style
 
 
 def test_a_result_that_a_style_below_has_no_place_for_is_refused_before_the_solve():

@@ -427,6 +427,7 @@ OPERATORS = (
     "ADD_HANDLE",
     "SET_REST",
     "RESET_HANDLE",
+    "KEY_HANDLE",
     "DEFORM",
     "LIVE",
     "STYLIZE",
@@ -497,6 +498,16 @@ def test_every_operator_names_its_page_and_every_page_exists():
     source_operator.end()
     assert source_operator.manual_map not in bpy.utils._manual_map
     source_operator.begin(registration.CLASSES)
+
+
+def test_the_tooltips_of_live_mode_are_those_of_their_buttons():
+    live = type("Properties", (), {"kind": "STYLIZE"})()
+    describe = next(c for c in registration.CLASSES if c.__name__ == "ARAPFIELDS_OT_live").description
+    assert describe(bpy.context, live).startswith("Show the style on the object")
+    assert "Guide: Stylize" in describe(bpy.context, live)
+    live.kind = "DEFORM"
+    assert describe(bpy.context, live).startswith("Let the shape follow its handles")
+    assert "Guide: Deform" in describe(bpy.context, live)
 
 
 def test_the_first_start_says_where_the_extension_is_and_only_the_first():

@@ -152,11 +152,11 @@ TRANSFERRED = (
 )
 
 TASKS = [
-    ("POSE", "Pose", "Pins and handles that move the shape, what it carries, and what is in its way"),
-    ("STYLE", "Style", "Shapes as of cubes, or of any object"),
-    ("WRAP", "Wrap", "One mesh onto another"),
+    ("POSE", "Pose", "Move the shape by pins and handles, around what is in its way"),
+    ("STYLE", "Style", "Give the shape the faces and edges of a cube, of another solid or of any object"),
+    ("WRAP", "Wrap", "Lay the mesh onto the surface of another object"),
     ("RIG", "Rig", "Weights of an armature, and stored poses"),
-    ("ANIMATE", "Animate", "Frames as keys and files, and what swings by itself"),
+    ("ANIMATE", "Animate", "Keyframe the handles, bake and export, and let parts swing by themselves"),
 ]
 
 
