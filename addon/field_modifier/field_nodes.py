@@ -301,7 +301,9 @@ def rows_of(field, local_to_solve, strength=1.0):
         raise UserError("Nodes know the method Fast alone, without Exact Handles or a wrap")
     arrays = field.arrays()
     if "fine_nodes" in arrays:
-        raise UserError("Nodes do not know fine parts such as the fingers of this shape; the extension moves it")
+        raise UserError(
+            "Nodes do not know fine parts such as the fingers of this shape; the extension moves it"
+        )
     affine = strength * (arrays["affine"] - np.eye(4, 3, -1))
     scale, inside = -1.0 / (6.0 * arrays["radii"] ** 2), arrays.get("embedded", 0.0)
     moves = strength * arrays["coefficients"]

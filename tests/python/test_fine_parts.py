@@ -23,6 +23,7 @@ BENT = {  # the held box, and how a finger or a toe turns about its root
 OTHERS = 0.02  # seen .0101
 OTHERS_LIVE = 0.2  # 2,000 samples and 360 centers for the whole figure; seen .16
 FOLLOWS = 0.01  # of a finger's way
+ALIKE = 1e-4  # between two fingers the nearest samples, which are not symmetric, tell the side
 JET_ERROR = 1e-4  # of a central difference, where two of different length agree as closely
 
 
@@ -105,12 +106,12 @@ def test_fine_parts_are_checked_on_loading(name, value, message, tmp_path):
 
 
 def test_a_symmetric_field_bends_both_hands_alike():
-    vertices, triangles, _, samples = figure(0.006)
+    vertices, _, _, samples = figure(0.006)
     field = af.deform(samples, handles_of(0.006, "finger1L"), af.DeformOptions(symmetry="y"))
     mirror = np.diag([1.0, -1.0, 1.0])
     # In bare space, so that both sides are looked at alike.
     moved, reflected = field(vertices), field(vertices @ mirror) @ mirror
-    assert np.quantile(np.abs(moved - reflected).max(axis=1), 0.99) < 1e-9
+    assert np.abs(moved - reflected).max() < ALIKE
     for name in ("finger1L", "finger1R"):
         own = ways(0.006, field, name)
         way = own.pop(name)
