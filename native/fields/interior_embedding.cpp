@@ -20,23 +20,25 @@
 namespace arapfields {
 namespace {
 
-constexpr Index most_nodes = 1500, least_nodes = 100, landmarks = 64, samples_a_node = 4;
+constexpr Index most_nodes = 1500, least_nodes = 100, landmarks = 64;
+/// Points of a fine region for each node of its part.
+constexpr Index points_a_node = 4;
 /// Ratio of straight distances to the lengths of the graph's paths, which zigzag between nodes.
 constexpr double detour = 0.94;
 /// Factor on the differences between interior and Euclidean distances.
 constexpr double emphasis = 2.0;
-/// Weight of smoothing against the embedding's values, and the cutoff of a node's neighbours in spacings.
-constexpr double part_smoothing = 1.0;
-constexpr double smoothing = 10.0, neighbour_spacings = 3.0;
+/// Weight of smoothing against the embedding's values, less where a part's nodes are near enough, and the
+/// cutoff of a node's neighbours in spacings.
+constexpr double smoothing = 10.0, part_smoothing = 1.0, neighbour_spacings = 3.0;
 /// Spread of ψ, as a fraction of the shape's size, below which Euclidean distances are used.
 constexpr double worthwhile_spread = 0.04;
 /// Logarithm of the weight, relative to the nearest node's, below which nodes are skipped.
 constexpr double negligible = -36.0;
 
 /// Where parts of the shape nearly touch: a sample this near, in widths, whose normal is opposite (its cosine
-/// is below), in front of the node or hardly behind it (as a share of the width).
-constexpr double part_facing_widths = 2.5;
-constexpr double facing_widths = 1.0, facing_cosine = -0.3, facing_behind = 1e-3;
+/// is below), in front of the node or hardly behind it (as a share of the width). A part's nodes look
+/// farther, since there gaps are seldom narrower than its nodes' spacing.
+constexpr double facing_widths = 1.0, part_facing_widths = 2.5, facing_cosine = -0.3, facing_behind = 1e-3;
 /// Distance, in widths, up to which it matters what a node sees: a point is within one width of its own
 /// node, and a weight of e^{−9} is little.
 constexpr double sight_widths = 4.0;
@@ -553,21 +555,6 @@ std::vector<SurfaceSide> InteriorEmbedding::own_sides_of(PointsIn points, Points
   return result;
 }
 
-std::vector<SurfaceSide> InteriorEmbedding::sides_of(PointsIn points, PointsIn normals,
-                                                     const InsideSight& mesh) const {
-  std::vector<SurfaceSide> result = own_sides_of(points, normals, mesh);
-  auto first = static_cast<SurfaceSide>(nodes.rows());
-  for (const EmbeddingPart& part : parts) {
-    const std::vector<Index> rows = part.ball.rows_inside(points);
-    const std::vector<SurfaceSide> own =
-        part.embedding.own_sides_of(points(rows, Eigen::all), normals(rows, Eigen::all), mesh);
-    for (std::size_t k = 0; part.embedding.sight && k < rows.size(); ++k)
-      result[static_cast<std::size_t>(rows[k])] = first + own[k];
-    first += static_cast<SurfaceSide>(part.embedding.nodes.rows());
-  }
-  return result;
-}
-
 std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& mesh, const Frame& frame) const {
   if (!has_sides()) return std::vector<SurfaceSide>(static_cast<std::size_t>(mesh.vertices.rows()), -1);
   const auto is_known = [&](const TriangleMesh& other) {
@@ -582,6 +569,19 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& mesh, c
 }
 
 namespace {
+
+/// Gives vertices, by their rows, the sides among a part's nodes that they have, of which the first has the
+/// number `first`, where the part's share is above those of the parts before.
+void take_sides(const EmbeddingPart& part, const std::vector<Index>& rows,
+                const std::vector<SurfaceSide>& own, SurfaceSide first, std::vector<SurfaceSide>& sides,
+                Vector& shares) {
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const double share = part.share.values(own[k], 0);
+    if (!(share > shares[rows[k]])) continue;
+    shares[rows[k]] = share;
+    sides[static_cast<std::size_t>(rows[k])] = first + own[k];
+  }
+}
 
 /// The vertices in a part's ball, and the triangles between them.
 TriangleMesh inside(const TriangleMesh& mesh, const std::vector<Index>& rows) {
@@ -602,14 +602,14 @@ TriangleMesh inside(const TriangleMesh& mesh, const std::vector<Index>& rows) {
 std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& outward, const Frame& frame,
                                                      const InsideSight& mesh) const {
   std::vector<SurfaceSide> result = own_sides_of(outward, frame, mesh);
+  Vector shares = Vector::Zero(outward.vertices.rows());
   auto first = static_cast<SurfaceSide>(nodes.rows());
   const Points places = frame.to_cube(outward.vertices);
   for (const EmbeddingPart& part : parts) {
     const std::vector<Index> rows = part.ball.rows_inside(places);
     if (part.embedding.sight && !rows.empty()) {
-      const std::vector<SurfaceSide> own = part.embedding.own_sides_of(inside(outward, rows), frame, mesh);
-      for (std::size_t k = 0; k < rows.size(); ++k)
-        result[static_cast<std::size_t>(rows[k])] = first + own[k];
+      take_sides(part, rows, part.embedding.own_sides_of(inside(outward, rows), frame, mesh), first, result,
+                 shares);
     }
     first += static_cast<SurfaceSide>(part.embedding.nodes.rows());
   }
@@ -634,16 +634,17 @@ void InteriorEmbedding::look_at(PointsIn samples, PointsIn normals, std::shared_
   mesh_sides_.assign(static_cast<std::size_t>(mesh->vertices.rows()), -1);
   if (sight) mesh_sides_ = know(*this, samples, normals, *mesh);
   const Points vertices = frame.to_cube(mesh->vertices);
+  Vector shares = Vector::Zero(vertices.rows());
   auto first = static_cast<SurfaceSide>(nodes.rows());
   for (EmbeddingPart& part : parts) {
     if (sight && part.embedding.sight)
       part.sides = own_sides_of(part.embedding.nodes, part.embedding.sight->normals, inside_sight);
     const std::vector<Index> rows = part.ball.rows_inside(samples), of_mesh = part.ball.rows_inside(vertices);
     if (part.embedding.sight) {
-      const std::vector<SurfaceSide> own =
-          know(part.embedding, samples(rows, Eigen::all), normals(rows, Eigen::all), inside(*mesh, of_mesh));
-      for (std::size_t k = 0; k < of_mesh.size(); ++k)
-        mesh_sides_[static_cast<std::size_t>(of_mesh[k])] = first + own[k];
+      take_sides(
+          part, of_mesh,
+          know(part.embedding, samples(rows, Eigen::all), normals(rows, Eigen::all), inside(*mesh, of_mesh)),
+          first, mesh_sides_, shares);
     }
     first += static_cast<SurfaceSide>(part.embedding.nodes.rows());
   }
@@ -793,8 +794,8 @@ std::shared_ptr<InteriorEmbedding> made_embedding(PointsIn samples, PointsIn nor
                                                   RegionOfWhole* part) {
   if (samples.rows() < least_nodes || normals.rows() != samples.rows()) return nullptr;
   const Index most = axis < 0 ? most_nodes : most_nodes / 2;
-  const FarthestPoints chosen = farthest_points(
-      samples, std::min<Index>(most, part ? samples.rows() / samples_a_node : samples.rows()));
+  const FarthestPoints chosen =
+      farthest_points(samples, std::min<Index>(most, part ? samples.rows() / points_a_node : samples.rows()));
   if (static_cast<Index>(chosen.indices.size()) < least_nodes || !(chosen.fill_distance > 0.0))
     return nullptr;
   InteriorEmbedding embedding;
@@ -927,9 +928,10 @@ InteriorEmbedding reflected(const InteriorEmbedding& of, int axis, const Vec3& s
 }  // namespace
 
 void add_parts(InteriorEmbedding& whole, const std::vector<FineRegion>& regions, const MakeSight& make_sight,
-               int axis) {
+               int axis, const Progress& progress) {
   std::vector<EmbeddingPart> parts;
   for (const FineRegion& region : regions) {
+    progress.check();
     RegionOfWhole part{region, Points(region.points.rows(), 3)};
     whole.evaluate(region.points, {part.known.data(), part.known.rows(), JetOrder::value});
     const auto made = made_embedding(region.points, region.normals, -1, {}, make_sight, &part);

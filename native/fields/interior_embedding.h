@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/jets.h"
+#include "core/task.h"
 #include "core/types.h"
 #include "distance/signed_distance.h"
 #include "fields/inside_sight.h"
@@ -70,25 +71,23 @@ struct EmbeddingPart;
 /// gradients at nodes of the surface and blended between them with normalised Gaussian weights, as wide as
 /// the nodes' spacing (Franke and Little's modification of Shepard's method). In the weights, a node that a
 /// point's side does not see counts by its interior distance: ψ is a function on the surface, not in space,
-/// and parts that touch at rest have values of their own. Fine parts have nodes of their own, and add to ψ
-/// what these nodes' spacing does not resolve.
+/// and parts that touch at rest have values of their own. Fine parts have nodes of their own, whose ψ
+/// takes the place of that of the whole there.
 struct ARAPFIELDS_EXPORT InteriorEmbedding {
   Points nodes;                                ///< (n,3)
   Points values;                               ///< (n,3) ψ at the nodes
   RowMatrix<double> slopes;                    ///< (n,9) ∂ψ_k/∂x_i at 3 k + i
   double width = 0.0;                          ///< of the Gaussians e^{−|x|²/width²}
   std::shared_ptr<NodeSight> sight = nullptr;  ///< null: all nodes that are near see each other
-  std::vector<EmbeddingPart> parts;            ///< what is finer than the nodes' spacing
+  std::vector<EmbeddingPart> parts;            ///< what the nodes' spacing does not resolve
 
   /// Whether ψ depends on the side of a point.
   bool has_sides() const;
   /// Jets of ψ at points (n,3), of any order, each on its side (n); null: on that of the nearest known place.
   void evaluate(PointsIn points, JetView<double> out, const std::vector<SurfaceSide>* sides = nullptr) const;
-  /// The sides (n) of points (n,3) of a surface with outward unit normals (n,3).
-  std::vector<SurfaceSide> sides_of(PointsIn points, PointsIn normals, const InsideSight& mesh) const;
-  /// The same of a mesh's vertices, in mesh coordinates; `frame` is that of the nodes' cube. The ends of a
-  /// short edge lie on sides that see each other, so that no such edge is torn, and vertices in one place on
-  /// one side if triangles join them, so that no seam is.
+  /// The sides (n) of a mesh's vertices, in mesh coordinates; `frame` is that of the nodes' cube. The ends of
+  /// a short edge lie on sides that see each other, so that no such edge is torn, and vertices in one place
+  /// on one side if triangles join them, so that no seam is.
   std::vector<SurfaceSide> sides_of(const TriangleMesh& mesh, const Frame& frame) const;
   /// Looks at the surface that the nodes lie on, by samples (n,3) of it with their normals and by the
   /// vertices of its mesh, whose triangles face outwards: points of unknown sides take that of the nearest of
@@ -140,8 +139,9 @@ ARAPFIELDS_EXPORT std::shared_ptr<InteriorEmbedding> interior_embedding(PointsIn
                                                                         const MakeSight& make_sight = {});
 
 /// Gives an embedding of samples a part for each fine region of their surface. With an axis, the regions lie
-/// on the side where that coordinate is positive, and their reflections are parts as well.
+/// on the side where that coordinate is positive, and their reflections are parts as well; −1: none. Throws
+/// Cancelled.
 void add_parts(InteriorEmbedding& whole, const std::vector<FineRegion>& regions, const MakeSight& make_sight,
-               int axis = -1);
+               int axis, const Progress& progress);
 
 }  // namespace arapfields

@@ -64,7 +64,7 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
     if (axis >= 0)
       std::erase_if(fine_regions,
                     [&](const FineRegion& region) { return region.points.col(axis).minCoeff() <= 0.0; });
-    if (!fine_regions.empty()) refine(*made, normals, make_sight, axis);
+    if (!fine_regions.empty()) refine(*made, normals, make_sight, axis, progress);
     progress.check();
   }
   if (made && made->has_sides()) {
@@ -87,8 +87,9 @@ void RestShape::lay_out(const Points& normals) {
   if (normals.rows() > 0) layout.inner = sites - thick.asDiagonal() * normals;
 }
 
-void RestShape::refine(InteriorEmbedding& own, Points normals, const MakeSight& make_sight, int axis) {
-  add_parts(own, fine_regions, make_sight, axis);
+void RestShape::refine(InteriorEmbedding& own, Points normals, const MakeSight& make_sight, int axis,
+                       const Progress& progress) {
+  add_parts(own, fine_regions, make_sight, axis, progress);
   for (const FineRegion& region : fine_regions) {
     std::vector<Index> rows;
     for (Index i = 0; i < region.points.rows(); i += points_a_site)
@@ -104,7 +105,10 @@ void RestShape::refine(InteriorEmbedding& own, Points normals, const MakeSight& 
   for (std::size_t k = 0, one_sided = fine_regions.size(); axis >= 0 && k < one_sided; ++k)
     fine_regions.push_back(fine_regions[k].reflected(axis));
   const auto finer = std::make_shared<LocalThickness>(*thickness);
-  for (const FineRegion& region : fine_regions) finer->refine(region);
+  for (const FineRegion& region : fine_regions) {
+    progress.check();
+    finer->refine(region);
+  }
   thickness = finer;
   lay_out(normals);
   if (axis >= 0) layout.inner.col(axis) = layout.inner.col(axis).cwiseAbs().eval();

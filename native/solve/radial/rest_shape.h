@@ -43,7 +43,8 @@ struct RestShape {
   void lay_out(const Points& normals);
   /// Gives the embedding parts at the fine regions, and measures and lays out these anew. With an axis, the
   /// regions are those of one side, and get their reflections.
-  void refine(InteriorEmbedding& own, Points normals, const MakeSight& make_sight, int axis);
+  void refine(InteriorEmbedding& own, Points normals, const MakeSight& make_sight, int axis,
+              const Progress& progress);
 
   std::uint64_t seed_;
   mutable OneAtATime<std::shared_ptr<const FollowedPlaces>> followed_;
