@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/parallel.h"
 #include "core/random.h"
@@ -31,8 +32,9 @@ constexpr Index most_thin = 8000, least_thin = 8;
 /// to the first of these shares of its size from them, and nothing from the second one; its points end at the
 /// last.
 constexpr double largest_share = 0.5, full_share = 0.25, no_share = 0.75, end_share = 1.0;
-/// Points that are drawn of a region, and the random stream.
-constexpr Index drawn_points = 3000;
+/// Points that are drawn of a region, at most so many tries for each, and fewest that are enough; the random
+/// stream.
+constexpr Index drawn_points = 3000, most_tries = 20, least_points = 500;
 constexpr std::uint64_t draw_stream = 7;
 /// Places farther from all points than so many spacings of theirs have no share.
 constexpr double near_spacings = 4.0;
@@ -104,48 +106,57 @@ std::vector<std::vector<Index>> clusters(const Points& points, double reach) {
   return result;
 }
 
-/// The region around thin places: what is connected with them near by.
-FineRegion region_of(const Points& thin, double size, const Points& vertices, const TriangleMesh& mesh,
-                     Random& random) {
+/// The region around thin places: what is connected with them near by. None where hardly any points are
+/// found.
+std::optional<FineRegion> region_of(const Points& thin, double size, const Points& vertices,
+                                    const TriangleMesh& mesh, Random& random) {
   FineRegion result;
   result.ball.center = 0.5 * (thin.colwise().minCoeff() + thin.colwise().maxCoeff()).transpose();
   const double end = end_share * size;
   result.size = size;
   result.ball.radius = 0.5 * size + end;
+  const Eigen::RowVector3d middle = result.ball.center.transpose();
   std::vector<Index> near;
-  for (Index t = 0; t < mesh.triangles.rows(); ++t)
-    for (int k = 0; k < 3; ++k)
-      if ((vertices.row(mesh.triangles(t, k)).transpose() - result.ball.center).norm() < result.ball.radius) {
-        near.push_back(t);
-        break;
-      }
+  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
+    const auto corner = [&](int k) { return vertices.row(mesh.triangles(t, k)); };
+    const Eigen::RowVector3d low = corner(0).cwiseMin(corner(1)).cwiseMin(corner(2)),
+                             high = corner(0).cwiseMax(corner(1)).cwiseMax(corner(2));
+    const Eigen::RowVector3d gap = (low - middle).cwiseMax(middle - high).cwiseMax(0.0);
+    if (gap.norm() < result.ball.radius) near.push_back(t);
+  }
   const Triangles triangles = mesh.triangles(near, Eigen::all);
   const std::vector<std::int32_t> pieces = pieces_of({mesh.vertices, triangles});
   const AreaSampler sampler(vertices, triangles);
   Points points(drawn_points, 3), normals(drawn_points, 3);
   std::vector<std::int32_t> piece;
-  for (Index i = 0; i < drawn_points; ++i) {
+  Index count = 0, tries = 0;
+  while (count < drawn_points && tries++ < most_tries * drawn_points) {  // triangles may reach far outside
     const AreaSampler::Draw draw = sampler.draw(random);
-    points.row(i) = draw.point.transpose();
-    normals.row(i) = sampler.unit_normal(draw.triangle).transpose();
+    if ((draw.point.transpose() - middle).norm() >= result.ball.radius) continue;
+    points.row(count) = draw.point.transpose();
+    normals.row(count++) = sampler.unit_normal(draw.triangle).transpose();
     piece.push_back(pieces[static_cast<std::size_t>(draw.triangle)]);
   }
+  if (count < least_points) return std::nullopt;
+  points.conservativeResize(count, Eigen::NoChange);
+  normals.conservativeResize(count, Eigen::NoChange);
   std::vector<bool> is_thin(static_cast<std::size_t>(*std::ranges::max_element(pieces)) + 1);
   for (const std::int32_t row : nearest_samples(points).closest(thin).triangles)
     is_thin[static_cast<std::size_t>(piece[static_cast<std::size_t>(row)])] = true;
   std::vector<Index> rows;
   std::vector<double> shares;
   const Vector away = nearest_distances(thin, points);
-  for (Index i = 0; i < drawn_points; ++i) {
+  for (Index i = 0; i < count; ++i) {
     if (!is_thin[static_cast<std::size_t>(piece[static_cast<std::size_t>(i)])] || away[i] > end) continue;
     const double t = std::clamp((no_share - away[i] / size) / (no_share - full_share), 0.0, 1.0);
     rows.push_back(i);
     shares.push_back(t * t * (3.0 - 2.0 * t));
   }
+  if (std::ssize(rows) < least_points) return std::nullopt;
   result.points = points(rows, Eigen::all);
   result.normals = normals(rows, Eigen::all);
   result.shares = Eigen::Map<const Vector>(shares.data(), std::ssize(shares));
-  result.spacing = std::sqrt(sampler.area() / static_cast<double>(drawn_points));
+  result.spacing = std::sqrt(sampler.area() / static_cast<double>(std::max(tries, count)));
   return result;
 }
 
@@ -202,7 +213,8 @@ std::vector<FineRegion> fine_regions(const SurfaceSamples& samples, const LocalT
     const double size = diagonal(own);
     if (std::ssize(cluster) < least_thin || size > largest_share * extent) continue;
     if (vertices.rows() == 0) vertices = samples.frame.to_cube(samples.mesh->vertices);
-    result.push_back(region_of(own, size, vertices, *samples.mesh, random));
+    if (auto region = region_of(own, size, vertices, *samples.mesh, random))
+      result.push_back(std::move(*region));
     progress.check();
   }
   return result;
