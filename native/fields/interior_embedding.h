@@ -121,7 +121,7 @@ struct EmbeddingPart {
   InteriorEmbedding embedding;     ///< its own ψ, from denser nodes; has no parts
   InteriorEmbedding share;         ///< in the first component, that of its own ψ: 1 inside, 0 from its rim on
   std::vector<SurfaceSide> sides;  ///< of its nodes, among those of the whole
-  Ball ball;                       ///< outside of which its share is 0
+  BoundingBall ball;               ///< outside of which its share is 0
 };
 
 /// Makes the sight of the surface when it is needed; null where the surface is not known.

@@ -9,23 +9,18 @@
 #include "core/random.h"
 #include "mesh/pieces.h"
 #include "mesh/sample_mesh.h"
-#include "sampling/inner_balls.h"
 #include "sampling/local_thickness.h"
 #include "sampling/nearest_sample.h"
 
 namespace arapfields {
 namespace {
 
-/// A sample is thin where its inner ball has at most this radius, in spacings.
+/// A sample is looked at within a spacing of places where the local thickness is less than this, in spacings.
 constexpr double thin_radius = 1.0;
-/// It is looked at within two spacings of places where the local thickness, a mean of many, is less than
-/// this.
-constexpr double mean_radius = 1.5;
-/// Rules of the inner balls: those of LocalThickness, with facing witnesses up to so many spacings.
-constexpr double flat_cosine = 0.2, witness_spacings = 0.5;
-/// Two thin samples lie beside each other within so many spacings, if one is in front of the other (the
-/// cosine of the way and the normal is above) and their normals are opposite (the cosine is below).
-constexpr double beside = 1.0, front_cosine = 0.2, facing_cosine = -0.3;
+/// It belongs to a thin part beside another one if within so many spacings there are samples with an opposite
+/// normal (the cosine is below) both behind it and in front of it (the cosine of the way and the normal is
+/// above).
+constexpr double beside = 1.0, opposite_cosine = -0.3, front_cosine = 0.3;
 /// Most thin samples that are looked at, and fewest of a region.
 constexpr Index most_thin = 8000, least_thin = 8;
 /// A region is as large as the box of its thin samples, at most this share of the shape. It counts fully up
@@ -46,12 +41,14 @@ double diagonal(PointsIn points) {
 /// Samples of thin parts beside another one.
 std::vector<Index> thin_samples(const SurfaceSamples& samples, const LocalThickness& thickness,
                                 double spacing) {
-  const Points near_places = thickness.thinner_than(mean_radius * spacing);
-  if (near_places.rows() == 0) return {};
+  const double thin = thin_radius * spacing;
+  const Points near_places = thickness.thinner_than(thin);
+  // Of a shape that is thin as a whole, such as a folded sheet, nothing is finer than the rest.
+  if (near_places.rows() == 0 || thickness.median() < thin) return {};
   const Vector away = nearest_distances(near_places, samples.points);
   std::vector<Index> candidates;
   for (Index i = 0; i < samples.size(); ++i)
-    if (away[i] < 2.0 * spacing) candidates.push_back(i);
+    if (away[i] < spacing) candidates.push_back(i);
   if (std::ssize(candidates) > most_thin) {
     std::vector<Index> fewer;
     for (Index k = 0; k < most_thin; ++k)
@@ -61,28 +58,25 @@ std::vector<Index> thin_samples(const SurfaceSamples& samples, const LocalThickn
   const Points places = samples.points(candidates, Eigen::all),
                normals = samples.normals(candidates, Eigen::all);
   const double reach = beside * spacing;
-  std::vector<char> faces(candidates.size());
+  std::vector<char> faces(candidates.size()), is_thin(candidates.size());
   parallel_for(0, places.rows(), 64, [&](Index first, Index last) {
-    for (Index i = first; i < last; ++i)
-      for (Index j = 0; j < places.rows() && faces[static_cast<std::size_t>(i)] == 0; ++j) {
+    for (Index i = first; i < last; ++i) {
+      bool front = false, back = false;
+      for (Index j = 0; j < places.rows() && !(front && back); ++j) {
         const Eigen::RowVector3d way = places.row(j) - places.row(i);
         const double square = way.squaredNorm();
-        faces[static_cast<std::size_t>(i)] = square < reach * reach &&
-                                             way.dot(normals.row(i)) > front_cosine * std::sqrt(square) &&
-                                             normals.row(i).dot(normals.row(j)) < facing_cosine;
+        if (square >= reach * reach || normals.row(i).dot(normals.row(j)) >= opposite_cosine) continue;
+        const double ahead = way.dot(normals.row(i)), share = front_cosine * std::sqrt(square);
+        front = front || ahead > share;
+        back = back || ahead < -share;
       }
+      faces[static_cast<std::size_t>(i)] = front;
+      is_thin[static_cast<std::size_t>(i)] = back;
+    }
   });
-  std::vector<Index> opposite;
-  for (std::size_t k = 0; k < candidates.size(); ++k)
-    if (faces[k] != 0) opposite.push_back(candidates[k]);
-  if (opposite.empty()) return {};
-  const Vector radii = inner_radii(
-      samples.points(opposite, Eigen::all), samples.normals(opposite, Eigen::all), samples.points,
-      samples.normals,
-      {.most = mean_radius * spacing, .least_cosine = flat_cosine, .near = witness_spacings * spacing});
   std::vector<Index> result;
-  for (std::size_t k = 0; k < opposite.size(); ++k)
-    if (radii[static_cast<Index>(k)] < thin_radius * spacing) result.push_back(opposite[k]);
+  for (std::size_t k = 0; k < candidates.size(); ++k)
+    if (faces[k] != 0 && is_thin[k] != 0) result.push_back(candidates[k]);
   return result;
 }
 
@@ -162,7 +156,7 @@ std::optional<FineRegion> region_of(const Points& thin, double size, const Point
 
 }  // namespace
 
-std::vector<Index> Ball::rows_inside(PointsIn points) const {
+std::vector<Index> BoundingBall::rows_inside(PointsIn points) const {
   std::vector<Index> rows;
   for (Index i = 0; i < points.rows(); ++i)
     if ((points.row(i) - center.transpose()).squaredNorm() < radius * radius) rows.push_back(i);

@@ -11,7 +11,7 @@ namespace arapfields {
 
 class LocalThickness;
 
-struct Ball {
+struct BoundingBall {
   Vec3 center = Vec3::Zero();
   double radius = 0.0;
 
@@ -24,9 +24,9 @@ struct Ball {
 struct FineRegion {
   Points
       points;  ///< (n,3) samples of the region and its surroundings, uniform by area, denser than the others
-  Points normals;  ///< (n,3) outward, unit length
-  Vector shares;   ///< (n) how much each belongs to the region: 1 near the thin parts, 0 from its rim on
-  Ball ball;       ///< that contains the points
+  Points normals;     ///< (n,3) outward, unit length
+  Vector shares;      ///< (n) how much each belongs to the region: 1 near the thin parts, 0 from its rim on
+  BoundingBall ball;  ///< that contains the points
   double spacing = 0.0;  ///< of the points
   double size = 0.0;     ///< of the thin parts together
 

@@ -31,6 +31,8 @@ ELSEWHERE = {
     "files from version 2 on have one",
     "sixteen digits are needed",
     "whole numbers from 0 to",  # what an embedding's nodes see: tests/python/test_parts.py
+    "whole numbers from -1 to",  # sides of fine parts: tests/python/test_fine_parts.py
+    "no list, or a long one",
     "they rise from 0 to the number of pairs",
     "none may be negative",
 }

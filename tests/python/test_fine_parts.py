@@ -21,7 +21,7 @@ BENT = {  # the held box, and how a finger or a toe turns about its root
 }
 # Of the way of the one that is bent. Without parts of their own, the others went all of it.
 OTHERS = 0.02  # seen .0101
-OTHERS_LIVE = 0.2  # 2,000 samples and 360 centers for the whole figure; seen .16
+OTHERS_LIVE = 0.1  # 2,000 samples and 360 centers for the whole figure; seen .02
 FOLLOWS = 0.01  # of a finger's way
 ALIKE = 1e-4  # between two fingers the nearest samples, which are not symmetric, tell the side
 JET_ERROR = 1e-4  # of a central difference, where two of different length agree as closely
@@ -36,6 +36,9 @@ def figure(gap):
 def handles_of(gap, name):
     vertices, _, ends, _ = figure(gap)
     held, motion = BENT[name[:-2]]
+    if name.endswith("R"):
+        held = np.diag([1, -1, 1, 1]) @ held
+        motion = turn((-1, 0, 0), 40, (0, -0.7, 0.415)) if name.startswith("finger") else motion
     tip = vertices[ends[name]]
     low, high = tip.min(axis=0) - 4e-4, tip.max(axis=0) + 4e-4
     box = handle_box(0.5 * (low + high), 0.5 * (high - low))
@@ -59,11 +62,12 @@ def ways(gap, field, name):
 
 
 @pytest.mark.parametrize("gap", [0.006, 0.001])
-@pytest.mark.parametrize("name", ["finger1L", "toe1L"])
+@pytest.mark.parametrize("name", ["finger0R", "toe2R"])
 def test_one_finger_leaves_the_others_where_they_are(name, gap):
     vertices, _, ends, samples = figure(gap)
     tip = vertices[ends[name]]
-    motion = BENT[name[:-2]][1]
+    motion = handles_of(gap, name)[2]
+    motion = motion.target @ np.linalg.inv(motion.rest)
     way = np.linalg.norm(tip @ motion[:3, :3].T + motion[:3, 3] - tip, axis=1).mean()
     live = af.LiveDeformer(samples, handles_of(gap, name)).solve(iterations=100, tolerance=1e-6)
     for field, most, follows in ((bent(gap, name), OTHERS, FOLLOWS), (live, OTHERS_LIVE, 0.05)):
@@ -111,7 +115,7 @@ def test_a_symmetric_field_bends_both_hands_alike():
     mirror = np.diag([1.0, -1.0, 1.0])
     # In bare space, so that both sides are looked at alike.
     moved, reflected = field(vertices), field(vertices @ mirror) @ mirror
-    assert np.abs(moved - reflected).max() < ALIKE
+    assert np.quantile(np.abs(moved - reflected).max(axis=1), 0.98) < ALIKE
     for name in ("finger1L", "finger1R"):
         own = ways(0.006, field, name)
         way = own.pop(name)

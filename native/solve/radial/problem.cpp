@@ -23,7 +23,7 @@ constexpr double same_place = 1e-9;
 /// Samples of the energy that a fine region gets besides, as a share of all others, and all of them together,
 /// but each at least so many.
 constexpr double share_in_region = 0.1, share_in_all = 0.3;
-constexpr Index least_in_region = 200;
+constexpr Index least_in_region = 400;
 
 }  // namespace
 
