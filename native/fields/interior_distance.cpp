@@ -10,7 +10,6 @@
 
 #include "core/parallel.h"
 #include "sampling/inner_balls.h"
-#include "sampling/parts.h"
 
 namespace arapfields {
 namespace {
@@ -56,11 +55,11 @@ InteriorGraph::InteriorGraph(PointsIn nodes, PointsIn normals, double spacing, c
           edges_[i].push_back({static_cast<std::int32_t>(j), static_cast<float>(std::sqrt(square))});
       }
   });
-  join_parts(nodes);
+  join_parts(nodes, may_join);
 }
 
 /// Joins the graph's connected components.
-void InteriorGraph::join_parts(PointsIn nodes) {
+void InteriorGraph::join_parts(PointsIn nodes, const MayJoin& may_join) {
   std::vector<Index> parts(edges_.size(), -1), open;
   for (Index start = 0, count = 0; start < size(); ++start) {
     if (parts[start] >= 0) continue;
@@ -73,7 +72,7 @@ void InteriorGraph::join_parts(PointsIn nodes) {
     }
     ++count;
   }
-  for (const auto& [from, to] : spanning_links(nodes, parts, {0})) {
+  for (const auto& [from, to] : spanning_links(nodes, parts, {0}, may_join)) {
     const auto length = static_cast<float>(std::sqrt((nodes.row(from) - nodes.row(to)).squaredNorm()));
     edges_[from].push_back({static_cast<std::int32_t>(to), length});
     edges_[to].push_back({static_cast<std::int32_t>(from), length});

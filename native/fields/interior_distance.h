@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <functional>
 #include <limits>
 #include <utility>
 #include <vector>
 
 #include "core/types.h"
+#include "sampling/parts.h"
 
 namespace arapfields {
-
-/// A predicate on two points, by their rows.
-using MayJoin = std::function<bool(Index, Index)>;
 
 /// A graph on samples of a surface, whose shortest paths approximate distances through the inside of the
 /// shape. Each node has the largest ball that touches the surface there from inside and contains no other
@@ -38,7 +35,7 @@ class InteriorGraph {
                                     float longest = std::numeric_limits<float>::infinity()) const;
 
  private:
-  void join_parts(PointsIn nodes);
+  void join_parts(PointsIn nodes, const MayJoin& may_join);
   std::vector<std::vector<Edge>> edges_;
 };
 

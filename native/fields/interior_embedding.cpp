@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/decompositions.h"
 #include "core/parallel.h"
 #include "fields/interior_embedding_kernel.h"
+#include "fields/multidimensional_scaling.h"
 #include "fields/radial_basis.h"
 #include "mesh/outward_triangles.h"
 #include "mesh/pieces.h"
@@ -30,6 +30,10 @@ constexpr double emphasis = 2.0;
 /// Weight of smoothing against the embedding's values, less where a part's nodes are near enough, and the
 /// cutoff of a node's neighbours in spacings.
 constexpr double smoothing = 10.0, part_smoothing = 1.0, neighbour_spacings = 3.0;
+/// ψ of a part keeps distances of nodes that are near in space before others: up to about so many widths.
+/// The leading coordinates of all distances would lay two of a hand's fingers into each other, since more
+/// than three ends that are equally far from each other need more than three coordinates.
+constexpr double stress_widths = 4.0;
 /// Spread of ψ, as a fraction of the shape's size, below which Euclidean distances are used.
 constexpr double worthwhile_spread = 0.04;
 /// Logarithm of the weight, relative to the nearest node's, below which nodes are skipped.
@@ -63,27 +67,6 @@ constexpr Index most_tried = 12;
 constexpr double like_cosine = 0.3;
 
 using Neighbours = std::vector<std::vector<Index>>;
-
-/// Landmark multidimensional scaling: coordinates (n,3) whose squared distances best approximate `excess`
-/// (n, landmarks); the first rows are the landmarks.
-Points leading_coordinates(const RowMatrix<double>& excess) {
-  const Index count = excess.cols();
-  const RowMatrix<double> own = 0.5 * (excess.topRows(count) + excess.topRows(count).transpose());
-  const Vector mean = own.rowwise().mean();
-  RowMatrix<double> products = -0.5 * own;
-  products.colwise() += 0.5 * mean;
-  products.rowwise() += 0.5 * mean.transpose();
-  products.array() -= 0.5 * mean.mean();
-  const auto eigen = symmetric_eigen(products);
-  Points result = Points::Zero(excess.rows(), 3);
-  for (int k = 0; k < 3; ++k) {
-    const double value = eigen.values[count - 1 - k];
-    if (!(value > 1e-12)) continue;
-    Vector direction = eigen.vectors.col(count - 1 - k) / std::sqrt(value);
-    result.col(k) = -0.5 * (excess * direction).array() + 0.5 * mean.dot(direction);
-  }
-  return result;
-}
 
 /// (1 + smoothing · graph Laplacian)⁻¹ values, by conjugate gradients.
 Points smoothed(const Points& values, const Neighbours& neighbours, double strength) {
@@ -616,15 +599,29 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& outward
   return result;
 }
 
-void InteriorEmbedding::look_at(PointsIn samples, PointsIn normals, std::shared_ptr<const TriangleMesh> mesh,
+void SidedPlaces::add(PointsIn more, PointsIn their_normals, PointsIn their_places) {
+  const auto append = [&](Points& to, PointsIn rows) {
+    to.conservativeResize(to.rows() + rows.rows(), Eigen::NoChange);
+    to.bottomRows(rows.rows()) = rows;
+  };
+  append(points, more);
+  append(normals, their_normals);
+  append(places, their_places);
+}
+
+SidedPlaces SidedPlaces::rows(const std::vector<Index>& chosen) const {
+  return {points(chosen, Eigen::all), normals(chosen, Eigen::all), places(chosen, Eigen::all)};
+}
+
+void InteriorEmbedding::look_at(const SidedPlaces& samples, std::shared_ptr<const TriangleMesh> mesh,
                                 const Frame& frame, const InsideSight& inside_sight) {
-  const auto know = [&](const InteriorEmbedding& own, PointsIn points, PointsIn directions,
-                        const TriangleMesh& of) {
+  const auto know = [&](const InteriorEmbedding& own, const SidedPlaces& known, const TriangleMesh& of) {
     std::vector<Index> near, near_vertices;
-    const std::vector<SurfaceSide> of_points = own.own_sides_of(points, directions, inside_sight, &near);
+    const std::vector<SurfaceSide> of_points =
+        own.own_sides_of(known.points, known.normals, inside_sight, &near);
     std::vector<SurfaceSide> of_vertices = own.own_sides_of(of, frame, inside_sight, &near_vertices);
     Points places(std::ssize(near) + std::ssize(near_vertices), 3);
-    places << points(near, Eigen::all), frame.to_cube(Points(of.vertices(near_vertices, Eigen::all)));
+    places << known.places(near, Eigen::all), frame.to_cube(Points(of.vertices(near_vertices, Eigen::all)));
     std::vector<SurfaceSide> sides;
     for (const Index i : near) sides.push_back(of_points[static_cast<std::size_t>(i)]);
     for (const Index i : near_vertices) sides.push_back(of_vertices[static_cast<std::size_t>(i)]);
@@ -632,19 +629,18 @@ void InteriorEmbedding::look_at(PointsIn samples, PointsIn normals, std::shared_
     return of_vertices;
   };
   mesh_sides_.assign(static_cast<std::size_t>(mesh->vertices.rows()), -1);
-  if (sight) mesh_sides_ = know(*this, samples, normals, *mesh);
+  if (sight) mesh_sides_ = know(*this, samples, *mesh);
   const Points vertices = frame.to_cube(mesh->vertices);
   Vector shares = Vector::Zero(vertices.rows());
   auto first = static_cast<SurfaceSide>(nodes.rows());
   for (EmbeddingPart& part : parts) {
     if (sight && part.embedding.sight)
       part.sides = own_sides_of(part.embedding.nodes, part.embedding.sight->normals, inside_sight);
-    const std::vector<Index> rows = part.ball.rows_inside(samples), of_mesh = part.ball.rows_inside(vertices);
     if (part.embedding.sight) {
-      take_sides(
-          part, of_mesh,
-          know(part.embedding, samples(rows, Eigen::all), normals(rows, Eigen::all), inside(*mesh, of_mesh)),
-          first, mesh_sides_, shares);
+      const std::vector<Index> of_mesh = part.ball.rows_inside(vertices);
+      const SidedPlaces known = samples.rows(part.ball.rows_inside(samples.points));
+      take_sides(part, of_mesh, know(part.embedding, known, inside(*mesh, of_mesh)), first, mesh_sides_,
+                 shares);
     }
     first += static_cast<SurfaceSide>(part.embedding.nodes.rows());
   }
@@ -855,12 +851,18 @@ std::shared_ptr<InteriorEmbedding> made_embedding(PointsIn samples, PointsIn nor
     else
       embedding.sight->set_nodes(embedding.nodes, embedding.width);
   }
-  RowMatrix<double> excess = (detour * graph.distances(count)).array().square();
+  RowMatrix<double> straight(n, count);
   for (Index i = 0; i < n; ++i)
     for (Index l = 0; l < count; ++l)
-      excess(i, l) =
-          std::max(0.0, excess(i, l) - (embedding.nodes.row(i) - embedding.nodes.row(l)).squaredNorm());
-  embedding.values = std::sqrt(emphasis) * leading_coordinates(excess);
+      straight(i, l) = (embedding.nodes.row(i) - embedding.nodes.row(l)).squaredNorm();
+  const RowMatrix<double> excess =
+      ((detour * graph.distances(count)).array().square() - straight.array()).cwiseMax(0.0);
+  embedding.values = classical_scaling(excess);
+  if (part) {
+    const double near = stress_widths * embedding.width;
+    reduce_stress(excess, (straight.array() + near * near).square().inverse(), embedding.values);
+  }
+  embedding.values *= std::sqrt(emphasis);
   Neighbours neighbours(n);
   const float cutoff = static_cast<float>(neighbour_spacings * embedding.width);
   for (Index i = 0; i < n; ++i)

@@ -66,6 +66,17 @@ struct ARAPFIELDS_EXPORT NodeSight {
 
 struct EmbeddingPart;
 
+/// Points (n,3) of a surface with their outward normals, and places (n,3) that lie on their sides: the points
+/// themselves, or places below them inside the shape.
+struct SidedPlaces {
+  Points points = Points(0, 3);
+  Points normals = Points(0, 3);
+  Points places = Points(0, 3);
+
+  void add(PointsIn more, PointsIn their_normals, PointsIn their_places);
+  SidedPlaces rows(const std::vector<Index>& chosen) const;
+};
+
 /// An embedding ψ that separates parts which are near in space but far apart inside the shape:
 /// |x − y|² + |ψ(x) − ψ(y)|² approximates the squared interior distance from x to y. ψ is given by values and
 /// gradients at nodes of the surface and blended between them with normalised Gaussian weights, as wide as
@@ -89,11 +100,11 @@ struct ARAPFIELDS_EXPORT InteriorEmbedding {
   /// a short edge lie on sides that see each other, so that no such edge is torn, and vertices in one place
   /// on one side if triangles join them, so that no seam is.
   std::vector<SurfaceSide> sides_of(const TriangleMesh& mesh, const Frame& frame) const;
-  /// Looks at the surface that the nodes lie on, by samples (n,3) of it with their normals and by the
-  /// vertices of its mesh, whose triangles face outwards: points of unknown sides take that of the nearest of
-  /// these, and the mesh's own are kept.
-  void look_at(PointsIn samples, PointsIn normals, std::shared_ptr<const TriangleMesh> mesh,
-               const Frame& frame, const InsideSight& sight);
+  /// Looks at the surface that the nodes lie on, by samples of it and by the vertices of its mesh, whose
+  /// triangles face outwards: points of unknown sides take that of the nearest of the samples' places and of
+  /// the vertices, and the mesh's own are kept.
+  void look_at(const SidedPlaces& samples, std::shared_ptr<const TriangleMesh> mesh, const Frame& frame,
+               const InsideSight& sight);
 
  private:
   void evaluate_own(PointsIn points, JetView<double> out, const std::vector<SurfaceSide>* sides) const;

@@ -2,6 +2,7 @@
 #include "fields/radial_basis.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -62,22 +63,25 @@ void RadialBasis::set_embedding(std::shared_ptr<const InteriorEmbedding> other) 
   if (embedding) embedding->evaluate(centers, {embedded.data(), center_count(), JetOrder::value});
 }
 
-FarthestPoints farthest_points(PointsIn points, Index count, const Vector& sizes) {
+FarthestPoints farthest_points(PointsIn points, Index count, const Vector& sizes, const Points& embedded) {
   require(points.rows() > 0 && points.allFinite(), "points", "none, or NaN or infinite ones",
           "finite points are needed");
   const Index n = points.rows(), stride = (n + 15) / 16 * 16;
-  std::vector<double> columns(3 * stride), distance(stride, 1e300), weights(stride, 1.0);
+  const int dimensions = embedded.rows() > 0 ? 6 : 3;
+  const auto coordinate = [&](Index i, int k) { return k < 3 ? points(i, k) : embedded(i, k - 3); };
+  std::vector<double> columns(dimensions * stride), distance(stride, 1e300), weights(stride, 1.0);
   for (Index i = 0; i < stride; ++i)
-    for (int k = 0; k < 3; ++k) columns[k * stride + i] = points(std::min(i, n - 1), k);
+    for (int k = 0; k < dimensions; ++k) columns[k * stride + i] = coordinate(std::min(i, n - 1), k);
   for (Index i = 0; i < stride && sizes.size() > 0; ++i)
     weights[i] = 1.0 / (sizes[std::min(i, n - 1)] * sizes[std::min(i, n - 1)]);
   Index next = first_center(points);
   FarthestPoints result;
   while (static_cast<Index>(result.indices.size()) < count) {
     result.indices.push_back(next);
-    const Vec3 from = points.row(next);
+    std::array<double, 6> from{};
+    for (int k = 0; k < dimensions; ++k) from[static_cast<std::size_t>(k)] = coordinate(next, k);
     const double worst = ARAPFIELDS_DISPATCH(
-        farthest_update(columns.data(), weights.data(), stride, from.data(), distance.data()));
+        farthest_update(columns.data(), dimensions, weights.data(), stride, from.data(), distance.data()));
     result.fill_distance = std::sqrt(worst);
     if (!(worst > 0.0)) break;
     next = std::min<Index>(std::find(distance.begin(), distance.end(), worst) - distance.begin(), n - 1);
@@ -96,7 +100,7 @@ RadialBasis radial_basis(PointsIn points, const std::vector<RadialScale>& scales
             std::to_string(scale.radius_factor), "must be positive");
     const bool two_layers = scale.two_layers && layout.inner.rows() == points.rows();
     const Index sites = two_layers ? (scale.count + 1) / 2 : scale.count;
-    const FarthestPoints chosen = farthest_points(points, sites, layout.sizes);
+    const FarthestPoints chosen = farthest_points(points, sites, layout.sizes, layout.embedded);
     const double extent = (points.colwise().maxCoeff() - points.colwise().minCoeff()).maxCoeff();
     // All points covered exactly (few points, or one): the radius falls back on the extent.
     const double fill = chosen.fill_distance > 0.0 ? chosen.fill_distance : std::max(extent, 1e-3);

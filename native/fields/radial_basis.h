@@ -20,6 +20,9 @@ struct RadialScale {
 struct RadialLayout {
   Vector sizes = {};  ///< (n, positive; empty: all 1) relative spacing and radius of centers at each point
   Points inner = {};  ///< (n,3; empty: scales have one layer) the point inside the shape below each
+  /// (n,3; empty: none) ψ at each point, which joins the distances between centers as it does those in a
+  /// basis
+  Points embedded = {};
 };
 
 /// The space of maps f(x) = Σ_m c_m φ(|x − p_m|² / r_m²) + (1, x)·c_affine, φ(s) = (1 − s/κ)₊^κ: the Gaussian
@@ -48,11 +51,13 @@ ARAPFIELDS_EXPORT RadialBasis radial_basis(PointsIn points, const std::vector<Ra
                                            const RadialLayout& layout = {});
 
 /// Indices of `count` farthest-point samples, and the fill distance: the largest of a point to its nearest
-/// sample. Distances are divided by the sizes (n; empty: all 1) of the samples that they are measured from.
+/// sample. Distances are divided by the sizes (n; empty: all 1) of the samples that they are measured from;
+/// `embedded` (n,3; empty: none): further coordinates of the points.
 struct FarthestPoints {
   std::vector<Index> indices;
   double fill_distance = 0.0;
 };
-ARAPFIELDS_EXPORT FarthestPoints farthest_points(PointsIn points, Index count, const Vector& sizes = {});
+ARAPFIELDS_EXPORT FarthestPoints farthest_points(PointsIn points, Index count, const Vector& sizes = {},
+                                                 const Points& embedded = {});
 
 }  // namespace arapfields

@@ -238,14 +238,17 @@ std::int64_t radial_active(const double* center, const double* ball_radius, cons
   return active_count;
 }
 
-double farthest_update(const double* points, const double* weights, std::int64_t count, const double* from,
-                       double* distance) {
+double farthest_update(const double* points, int dimensions, const double* weights, std::int64_t count,
+                       const double* from, double* distance) {
   using P = Pack<double>;
   P worst = {};
   for (std::int64_t i = 0; i < count; i += lanes<double>) {
-    const P x = load(points + i) - from[0], y = load(points + count + i) - from[1],
-            z = load(points + 2 * count + i) - from[2];
-    const P square = load(weights + i) * (x * x + y * y + z * z), before = load(distance + i);
+    P sum = {};
+    for (int k = 0; k < dimensions; ++k) {
+      const P way = load(points + k * count + i) - from[k];
+      sum += way * way;
+    }
+    const P square = load(weights + i) * sum, before = load(distance + i);
     const P now = square < before ? square : before;
     store(distance + i, now);
     worst = now > worst ? now : worst;

@@ -45,9 +45,9 @@ ARAPFIELDS_DECLARE(void radial_rows(const RadialBlock<double>&, int columns, dou
 ARAPFIELDS_DECLARE(std::int64_t radial_active(const double* center, const double* ball_radius,
                                               const double* centers, std::int64_t count,
                                               std::int32_t* active))
-// distance ← min(distance, weight |point − from|²) for points (3, count); `count` is a multiple of 16. The
-// largest.
-ARAPFIELDS_DECLARE(double farthest_update(const double* points, const double* weights, std::int64_t count,
-                                          const double* from, double* distance))
+// distance ← min(distance, weight |point − from|²) for points (dimensions, count); `count` is a multiple
+// of 16. The largest.
+ARAPFIELDS_DECLARE(double farthest_update(const double* points, int dimensions, const double* weights,
+                                          std::int64_t count, const double* from, double* distance))
 
 }  // namespace arapfields

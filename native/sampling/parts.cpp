@@ -70,8 +70,9 @@ std::vector<Index> parts_of(PointsIn points) {
 }
 
 std::vector<PartLink> spanning_links(PointsIn points, const std::vector<Index>& parts,
-                                     std::vector<Index> joined) {
+                                     std::vector<Index> joined, const MayJoin& may_join) {
   std::vector<PartLink> links;
+  const std::vector<Index> first = joined;
   std::vector<Index> left(parts.size()), from(parts.size(), -1);  // points not joined yet, and whereto
   std::iota(left.begin(), left.end(), Index{0});
   std::vector<double> squares(parts.size(), std::numeric_limits<double>::infinity());
@@ -85,10 +86,18 @@ std::vector<PartLink> spanning_links(PointsIn points, const std::vector<Index>& 
     for (const Index j : left)
       for (const Index i : added) {
         const double square = (points.row(i) - points.row(j)).squaredNorm();
-        if (square < squares[at(j)]) squares[at(j)] = square, from[at(j)] = i;
+        if (square < squares[at(j)] && (!may_join || may_join(i, j)))
+          squares[at(j)] = square, from[at(j)] = i;
       }
     const Index next = *std::min_element(left.begin(), left.end(),
                                          [&](Index a, Index b) { return squares[at(a)] < squares[at(b)]; });
+    if (from[at(next)] < 0) {  // no part that is left may be joined: they are joined nevertheless
+      joined = first;
+      for (const auto& [known, added_point] : links) joined.push_back(parts[at(added_point)]);
+      const std::vector<PartLink> more = spanning_links(points, parts, joined);
+      links.insert(links.end(), more.begin(), more.end());
+      return links;
+    }
     links.emplace_back(from[at(next)], next);
     joined = {parts[at(next)]};
   }

@@ -16,7 +16,8 @@ namespace {
 constexpr Index worth_threads = 1000000;
 /// Least number of fine centers for a second layer in live solves (docs/notes/centers.md). With fewer, basis
 /// functions are wider than the distance of the layers and nearly dependent: solves take 1.5 times as many
-/// iterations.
+/// iterations. Shapes with fine regions get as many: with a single layer and fewer, a finger's base turns the
+/// fingers beside it.
 constexpr int worth_two_layers = 400;
 /// A place of the mesh that is no farther from a sample, in cube units, is that sample.
 constexpr double same_place = 1e-9;
@@ -40,8 +41,11 @@ RadialProblem::RadialProblem(const SurfaceSamples& surface, const LiveOptions& s
   const auto seed = static_cast<std::uint64_t>(options.seed);
   // Deform and stylize, which pass a shape in, evaluate the field off the surface as well. On a flat sheet
   // no function of one layer has a slope across it.
-  const bool two_layers = shape || options.fine_centers >= worth_two_layers || samples.sheet_sizes.size() > 0;
+  const bool off_surface = shape || samples.sheet_sizes.size() > 0;
   if (!shape) shape = std::make_shared<const RestShape>(samples, options.interior, seed, progress, axis);
+  const int fine_centers =
+      shape->fine_regions.empty() ? options.fine_centers : std::max(options.fine_centers, worth_two_layers);
+  const bool two_layers = off_surface || fine_centers >= worth_two_layers;
   Random random(seed);
   const std::vector<Index> chosen = stratified(shape->order, options.samples, random);
   add_energy_samples(chosen);
@@ -49,7 +53,7 @@ RadialProblem::RadialProblem(const SurfaceSamples& surface, const LiveOptions& s
   for (const FineRegion& region : shape->fine_regions) refine(region);
   std::vector<RadialScale> scales;
   if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
-  scales.push_back({options.fine_centers, options.fine_radius_factor, two_layers});
+  scales.push_back({fine_centers, options.fine_radius_factor, two_layers});
   if (axis >= 0) {
     mirror.emplace();
     mirror->axis = axis;

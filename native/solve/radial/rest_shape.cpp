@@ -16,7 +16,7 @@ constexpr Index most_sites = 6000;
 /// its median.
 constexpr double least_size = 0.1;
 /// Factor on the centers' spacing in fine regions.
-constexpr double finer_centers = 0.5;
+constexpr double finer_centers = 0.4;
 /// Points of a fine region for each candidate.
 constexpr Index points_a_site = 3;
 /// The random stream that chooses the sites.
@@ -68,15 +68,18 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
     progress.check();
   }
   if (made && made->has_sides()) {
-    Points known = samples.points, directions = samples.normals;
-    for (const FineRegion& region : fine_regions) {  // some of these are samples of the energy
-      const Index before = known.rows(), count = before + region.points.rows();
-      known.conservativeResize(count, Eigen::NoChange);
-      known.bottomRows(region.points.rows()) = region.points;
-      directions.conservativeResize(count, Eigen::NoChange);
-      directions.bottomRows(region.points.rows()) = region.normals;
+    SidedPlaces known{samples.points, samples.normals, samples.points};
+    for (const FineRegion& region : fine_regions)  // some of these are samples of the energy
+      known.add(region.points, region.normals, region.points);
+    known.add(sites, normals, layout.inner);  // centers of the second layer
+    if (axis >= 0) {
+      Points reflected[] = {sites, normals, layout.inner};
+      for (Points& points : reflected) points.col(axis) *= -1.0;
+      known.add(reflected[0], reflected[1], reflected[2]);
     }
-    made->look_at(known, directions, samples.mesh, samples.frame, *sight);
+    made->look_at(known, samples.mesh, samples.frame, *sight);
+    layout.embedded.resize(sites.rows(), 3);
+    made->evaluate(sites, {layout.embedded.data(), sites.rows(), JetOrder::value});
   }
   embedding = made;
 }
@@ -87,7 +90,7 @@ void RestShape::lay_out(const Points& normals) {
   if (normals.rows() > 0) layout.inner = sites - thick.asDiagonal() * normals;
 }
 
-void RestShape::refine(InteriorEmbedding& own, Points normals, const MakeSight& make_sight, int axis,
+void RestShape::refine(InteriorEmbedding& own, Points& normals, const MakeSight& make_sight, int axis,
                        const Progress& progress) {
   add_parts(own, fine_regions, make_sight, axis, progress);
   for (const FineRegion& region : fine_regions) {

@@ -42,8 +42,8 @@ struct RestShape {
   /// The centers' layout at the sites, with their normals (none: empty).
   void lay_out(const Points& normals);
   /// Gives the embedding parts at the fine regions, and measures and lays out these anew. With an axis, the
-  /// regions are those of one side, and get their reflections.
-  void refine(InteriorEmbedding& own, Points normals, const MakeSight& make_sight, int axis,
+  /// regions are those of one side, and get their reflections. `normals` become those of all sites.
+  void refine(InteriorEmbedding& own, Points& normals, const MakeSight& make_sight, int axis,
               const Progress& progress);
 
   std::uint64_t seed_;
