@@ -599,7 +599,8 @@ std::vector<SurfaceSide> InteriorEmbedding::sides_of(const TriangleMesh& outward
   return result;
 }
 
-void SidedPlaces::add(PointsIn more, PointsIn their_normals, PointsIn their_places) {
+void SidedPlaces::add(PointsIn more, PointsIn their_normals, PointsIn their_places,
+                      const Vector& their_shares) {
   const auto append = [&](Points& to, PointsIn rows) {
     to.conservativeResize(to.rows() + rows.rows(), Eigen::NoChange);
     to.bottomRows(rows.rows()) = rows;
@@ -607,10 +608,16 @@ void SidedPlaces::add(PointsIn more, PointsIn their_normals, PointsIn their_plac
   append(points, more);
   append(normals, their_normals);
   append(places, their_places);
+  shares.conservativeResize(points.rows());
+  if (their_shares.size() > 0)
+    shares.tail(more.rows()) = their_shares;
+  else
+    shares.tail(more.rows()).setZero();
 }
 
 SidedPlaces SidedPlaces::rows(const std::vector<Index>& chosen) const {
-  return {points(chosen, Eigen::all), normals(chosen, Eigen::all), places(chosen, Eigen::all)};
+  return {points(chosen, Eigen::all), normals(chosen, Eigen::all), places(chosen, Eigen::all),
+          shares(chosen)};
 }
 
 void InteriorEmbedding::look_at(const SidedPlaces& samples, std::shared_ptr<const TriangleMesh> mesh,
@@ -629,7 +636,12 @@ void InteriorEmbedding::look_at(const SidedPlaces& samples, std::shared_ptr<cons
     return of_vertices;
   };
   mesh_sides_.assign(static_cast<std::size_t>(mesh->vertices.rows()), -1);
-  if (sight) mesh_sides_ = know(*this, samples, *mesh);
+  if (sight) {
+    std::vector<Index> beside_parts;
+    for (Index i = 0; i < samples.shares.size(); ++i)
+      if (samples.shares[i] < 1.0) beside_parts.push_back(i);
+    mesh_sides_ = know(*this, samples.rows(beside_parts), *mesh);
+  }
   const Points vertices = frame.to_cube(mesh->vertices);
   Vector shares = Vector::Zero(vertices.rows());
   auto first = static_cast<SurfaceSide>(nodes.rows());

@@ -72,8 +72,10 @@ struct SidedPlaces {
   Points points = Points(0, 3);
   Points normals = Points(0, 3);
   Points places = Points(0, 3);
+  Vector shares = Vector(0);  ///< (n) of fine parts: where it is 1, only the part's ψ matters
 
-  void add(PointsIn more, PointsIn their_normals, PointsIn their_places);
+  /// `their_shares`: none: all 0.
+  void add(PointsIn more, PointsIn their_normals, PointsIn their_places, const Vector& their_shares = {});
   SidedPlaces rows(const std::vector<Index>& chosen) const;
 };
 

@@ -11,6 +11,7 @@
 #include "mesh/sample_mesh.h"
 #include "sampling/local_thickness.h"
 #include "sampling/nearest_sample.h"
+#include "sampling/sample_choice.h"
 
 namespace arapfields {
 namespace {
@@ -29,7 +30,7 @@ constexpr Index most_thin = 8000, least_thin = 8;
 constexpr double largest_share = 0.5, full_share = 0.25, no_share = 0.75, end_share = 1.0;
 /// Points that are drawn of a region, at most so many tries for each, and fewest that are enough; the random
 /// stream.
-constexpr Index drawn_points = 3000, most_tries = 20, least_points = 500;
+constexpr Index drawn_points = 2000, most_tries = 20, least_points = 500;
 constexpr std::uint64_t draw_stream = 7;
 /// Places farther from all points than so many spacings of theirs have no share.
 constexpr double near_spacings = 4.0;
@@ -49,12 +50,9 @@ std::vector<Index> thin_samples(const SurfaceSamples& samples, const LocalThickn
   std::vector<Index> candidates;
   for (Index i = 0; i < samples.size(); ++i)
     if (away[i] < spacing) candidates.push_back(i);
-  if (std::ssize(candidates) > most_thin) {
-    std::vector<Index> fewer;
-    for (Index k = 0; k < most_thin; ++k)
-      fewer.push_back(candidates[static_cast<std::size_t>(k * std::ssize(candidates) / most_thin)]);
-    candidates = std::move(fewer);
-  }
+  std::vector<Index> looked = evenly(std::ssize(candidates), most_thin);
+  for (Index& row : looked) row = candidates[static_cast<std::size_t>(row)];
+  candidates = std::move(looked);
   const Points places = samples.points(candidates, Eigen::all),
                normals = samples.normals(candidates, Eigen::all);
   const double reach = beside * spacing;
@@ -149,6 +147,7 @@ std::optional<FineRegion> region_of(const Points& thin, double size, const Point
   if (std::ssize(rows) < least_points) return std::nullopt;
   result.points = points(rows, Eigen::all);
   result.normals = normals(rows, Eigen::all);
+  result.nearest_point = std::make_shared<const SignedDistance>(nearest_samples(result.points));
   result.shares = Eigen::Map<const Vector>(shares.data(), std::ssize(shares));
   result.spacing = std::sqrt(sampler.area() / static_cast<double>(std::max(tries, count)));
   return result;
@@ -168,6 +167,7 @@ FineRegion FineRegion::reflected(int axis) const {
   result.points.col(axis) *= -1.0;
   result.normals.col(axis) *= -1.0;
   result.ball.center[axis] *= -1.0;
+  result.nearest_point = std::make_shared<const SignedDistance>(nearest_samples(result.points));
   return result;
 }
 
@@ -175,7 +175,7 @@ std::vector<Index> FineRegion::rows_on(PointsIn places, std::vector<std::int32_t
   const std::vector<Index> near = ball.rows_inside(places);
   std::vector<Index> result;
   if (near.empty()) return result;
-  const auto found = nearest_samples(points).closest(places(near, Eigen::all));
+  const ClosestPoints found = nearest_point->closest(places(near, Eigen::all));
   for (std::size_t k = 0; k < near.size(); ++k) {
     if (!(found.distances[static_cast<Index>(k)] < near_spacings * spacing)) continue;
     result.push_back(near[k]);

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "core/task.h"
 #include "core/types.h"
+#include "distance/signed_distance.h"
 #include "mesh/surface_samples.h"
 
 namespace arapfields {
@@ -22,13 +24,14 @@ struct BoundingBall {
 /// A region of a surface where parts of the shape that are thin for the spacing of samples lie beside each
 /// other, such as a figure's hand with its fingers.
 struct FineRegion {
-  Points
-      points;  ///< (n,3) samples of the region and its surroundings, uniform by area, denser than the others
+  /// (n,3) samples of the region and its surroundings, uniform by area, denser than the others
+  Points points;
   Points normals;     ///< (n,3) outward, unit length
   Vector shares;      ///< (n) how much each belongs to the region: 1 near the thin parts, 0 from its rim on
   BoundingBall ball;  ///< that contains the points
-  double spacing = 0.0;  ///< of the points
-  double size = 0.0;     ///< of the thin parts together
+  std::shared_ptr<const SignedDistance> nearest_point;  ///< among the points
+  double spacing = 0.0;                                 ///< of the points
+  double size = 0.0;                                    ///< of the thin parts together
 
   FineRegion reflected(int axis) const;
   /// The rows of places (n,3) of the surface that are near its points; `nearest`: is given the nearest point

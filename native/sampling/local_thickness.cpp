@@ -14,6 +14,8 @@ namespace arapfields {
 namespace {
 
 constexpr Index most_nodes = 1500, most_witnesses = 6000;
+/// Samples for each node in a fine region, which has few.
+constexpr Index samples_a_node = 2;
 /// The limits, as fractions of the radius of gyration.
 constexpr double most_share = 0.6, least_share = 0.02;
 /// The most of an open sheet, as a fraction of the square root of its area.
@@ -29,12 +31,13 @@ constexpr double smooth_share = 0.5, blend_spacings = 1.0;
 
 LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::vector<std::uint32_t>& order,
                                const Vector& sheet_sizes) {
+  const Index node_count = std::min(most_nodes, std::max<Index>(samples.rows() / samples_a_node, 1));
   const bool extended = (samples.rowwise() - samples.row(0)).cwiseAbs().maxCoeff() > 0.0;
   const double gyration =
       extended ? Frame::balanced(samples, Vector::Ones(samples.rows()), {}, 1.0).scale : 1.0;
   most_ = median_ = most_share * gyration;
   if (!extended || normals.rows() != samples.rows()) return;
-  const std::vector<Index> chosen = evenly(order, most_nodes), witness_rows = evenly(order, most_witnesses);
+  const std::vector<Index> chosen = evenly(order, node_count), witness_rows = evenly(order, most_witnesses);
   nodes_ = samples(chosen, Eigen::all);
   const Points node_normals = normals(chosen, Eigen::all);
   const Points witnesses = samples(witness_rows, Eigen::all),

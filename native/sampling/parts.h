@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/export.h"
 #include "core/types.h"
 
 namespace arapfields {
@@ -22,7 +23,9 @@ using MayJoin = std::function<bool(Index, Index)>;
 /// The shortest lines that join all parts to those in `joined`, a minimum spanning forest (Prim 1957).
 /// `parts` (n) has the part of each point (n,3). Lines between points that may not be joined are taken only
 /// where there are no others; `may_join`: none: all may.
-std::vector<PartLink> spanning_links(PointsIn points, const std::vector<Index>& parts,
-                                     std::vector<Index> joined, const MayJoin& may_join = {});
+ARAPFIELDS_EXPORT_TO_TESTS std::vector<PartLink> spanning_links(PointsIn points,
+                                                                const std::vector<Index>& parts,
+                                                                std::vector<Index> joined,
+                                                                const MayJoin& may_join = {});
 
 }  // namespace arapfields

@@ -81,10 +81,16 @@ std::vector<std::uint32_t> canonical_order(PointsIn points) {
   return morton_order(placed);
 }
 
-std::vector<Index> evenly(const std::vector<std::uint32_t>& list, Index count) {
-  const Index n = static_cast<Index>(list.size()), taken = std::min(n, count);
+std::vector<Index> evenly(Index size, Index count) {
+  const Index taken = std::min(size, count);
   std::vector<Index> result;
-  for (Index i = 0; i < taken; ++i) result.push_back(list[(2 * i + 1) * n / (2 * taken)]);
+  for (Index i = 0; i < taken; ++i) result.push_back((2 * i + 1) * size / (2 * taken));
+  return result;
+}
+
+std::vector<Index> evenly(const std::vector<std::uint32_t>& list, Index count) {
+  std::vector<Index> result = evenly(std::ssize(list), count);
+  for (Index& entry : result) entry = list[static_cast<std::size_t>(entry)];
   return result;
 }
 

@@ -29,6 +29,8 @@ Vector entries_of(const Vector& numbers, const std::vector<Index>& rows);
 /// hardly changes when a few outliers are added.
 std::vector<std::uint32_t> canonical_order(PointsIn points);
 
+/// `count` evenly spaced numbers from 0 to size − 1, or all if there are no more.
+std::vector<Index> evenly(Index size, Index count);
 /// `count` evenly spaced entries of the list, or all if it has no more.
 std::vector<Index> evenly(const std::vector<std::uint32_t>& list, Index count);
 

@@ -20,8 +20,8 @@ BENT = {  # the held box, and how a finger or a toe turns about its root
     "toe": (SOLE, turn((0, 1, 0), 40, (0.13, 0, -0.89))),
 }
 # Of the way of the one that is bent. Without parts of their own, the others went all of it.
-OTHERS = 0.02  # seen .0101
-OTHERS_LIVE = 0.1  # 2,000 samples and 360 centers for the whole figure; seen .02
+OTHERS = 0.01  # seen .003
+OTHERS_LIVE = 0.05  # 2,000 samples and 400 centers for the whole figure; seen .018
 FOLLOWS = 0.01  # of a finger's way
 ALIKE = 1e-4  # between two fingers the nearest samples, which are not symmetric, tell the side
 JET_ERROR = 1e-4  # of a central difference, where two of different length agree as closely
@@ -62,7 +62,7 @@ def ways(gap, field, name):
 
 
 @pytest.mark.parametrize("gap", [0.006, 0.001])
-@pytest.mark.parametrize("name", ["finger0R", "toe2R"])
+@pytest.mark.parametrize("name", ["finger0R", "finger1L", "toe2R"])
 def test_one_finger_leaves_the_others_where_they_are(name, gap):
     vertices, _, ends, samples = figure(gap)
     tip = vertices[ends[name]]

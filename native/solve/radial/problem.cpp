@@ -50,7 +50,7 @@ RadialProblem::RadialProblem(const SurfaceSamples& surface, const LiveOptions& s
   const std::vector<Index> chosen = stratified(shape->order, options.samples, random);
   add_energy_samples(chosen);
   add_energy_samples(missed_rows(samples.points, chosen));
-  for (const FineRegion& region : shape->fine_regions) refine(region);
+  if (!shape->fine_regions.empty()) refine();
   std::vector<RadialScale> scales;
   if (options.coarse_centers > 0) scales.push_back({options.coarse_centers, options.coarse_radius_factor});
   scales.push_back({fine_centers, options.fine_radius_factor, two_layers});
@@ -72,31 +72,39 @@ void RadialProblem::add_energy_samples(const std::vector<Index>& rows) {
   ++energy_revision;
 }
 
-void RadialProblem::refine(const FineRegion& region) {
+void RadialProblem::refine() {
+  const std::vector<FineRegion>& regions = shape->fine_regions;
   const Index before = samples.size();
-  const double share =
-      std::min(share_in_region, share_in_all / static_cast<double>(shape->fine_regions.size()));
+  const double share = std::min(share_in_region, share_in_all / static_cast<double>(regions.size()));
   const Index most = std::max<Index>(least_in_region, static_cast<Index>(share * options.samples));
   MeshPlaces places;
-  const Index count = std::min<Index>(most, region.points.rows());
-  std::vector<Index> picked;
-  for (Index k = 0; k < count; ++k) picked.push_back(k * region.points.rows() / count);
-  places.points = frame().to_mesh(Points(region.points(picked, Eigen::all)));
-  places.normals = region.normals(picked, Eigen::all);
-  add_samples(places);
-  std::vector<Index> rows(static_cast<std::size_t>(samples.size() - before));
-  std::iota(rows.begin(), rows.end(), before);
-  // The energy stays a mean over the area: all samples of the region share that of the former ones.
-  const std::vector<Index> former = region.rows_on(energy_points);
-  const auto all = static_cast<double>(former.size() + rows.size());
-  const double left = static_cast<double>(former.size()) / all;
+  std::vector<std::size_t> region_of;
+  for (const FineRegion& region : regions) {
+    const std::vector<Index> picked = evenly(region.points.rows(), most);
+    const Index first = std::ssize(region_of), count = first + std::ssize(picked);
+    places.points.conservativeResize(count, Eigen::NoChange);
+    places.points.bottomRows(count - first) = frame().to_mesh(Points(region.points(picked, Eigen::all)));
+    places.normals.conservativeResize(count, Eigen::NoChange);
+    places.normals.bottomRows(count - first) = region.normals(picked, Eigen::all);
+    region_of.resize(static_cast<std::size_t>(count), static_cast<std::size_t>(&region - regions.data()));
+  }
+  const std::vector<Index> added = add_samples(places);
   if (areas.size() == 0) areas = Vector::Ones(samples.size());
-  for (const Index row : rows) areas[row] = left;
-  for (const Index k : former) areas[energy_samples[static_cast<std::size_t>(k)]] *= left;
-  add_energy_samples(rows);
+  // The energy stays a mean over the area: all samples of a region share that of the former ones.
+  for (std::size_t r = 0; r < regions.size(); ++r) {
+    std::vector<Index> rows;
+    for (std::size_t k = 0; k < added.size(); ++k)
+      if (region_of[static_cast<std::size_t>(added[k])] == r) rows.push_back(before + static_cast<Index>(k));
+    const std::vector<Index> former = regions[r].rows_on(energy_points);
+    const auto all = static_cast<double>(former.size() + rows.size());
+    const double left = static_cast<double>(former.size()) / all;
+    for (const Index row : rows) areas[row] = left;
+    for (const Index k : former) areas[energy_samples[static_cast<std::size_t>(k)]] *= left;
+    add_energy_samples(rows);
+  }
 }
 
-void RadialProblem::add_samples(const MeshPlaces& places) {
+std::vector<Index> RadialProblem::add_samples(const MeshPlaces& places) {
   const auto found = nearest_samples(samples.points).closest(frame().to_cube(places.points));
   std::vector<Index> rows, nearest, like;
   for (Index i = 0; i < places.points.rows(); ++i) {
@@ -132,6 +140,7 @@ void RadialProblem::add_samples(const MeshPlaces& places) {
     for (const Index row : nearest)
       samples.mesh_indices.push_back(samples.mesh_indices[static_cast<std::size_t>(row)]);
   alike.insert(alike.end(), like.begin(), like.end());
+  return rows;
 }
 
 Vector RadialProblem::at_all(const std::string& argument, const Vector& given) const {

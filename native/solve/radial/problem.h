@@ -30,8 +30,9 @@ struct RadialProblem {
   const Points& surface() const { return samples.points; }
   const Frame& frame() const { return samples.frame; }
   void add_energy_samples(const std::vector<Index>& rows);
-  /// Adds samples at places of the mesh where none is, with the weights of the samples nearest to them.
-  void add_samples(const MeshPlaces& places);
+  /// Adds samples at places of the mesh where none is, with the weights of the samples nearest to them;
+  /// returns the rows of these places.
+  std::vector<Index> add_samples(const MeshPlaces& places);
   /// Numbers at the samples that were given (none: empty), for all samples: added ones have that of the
   /// nearest given one. Throws InvalidInput that names the argument for another number of them.
   Vector at_all(const std::string& argument, const Vector& given) const;
@@ -41,8 +42,8 @@ struct RadialProblem {
   SurfaceSamples given_samples() const;
   /// Relative area that each energy sample stands for, 1 on average; empty: all alike.
   Vector energy_areas() const;
-  /// Adds samples of the energy in a fine region.
-  void refine(const FineRegion& region);
+  /// Adds samples of the energy in the fine regions.
+  void refine();
   /// Threads of a solve; 1 for a small problem.
   int solve_threads() const;
 

@@ -68,9 +68,10 @@ RestShape::RestShape(const SurfaceSamples& samples, bool interior, std::uint64_t
     progress.check();
   }
   if (made && made->has_sides()) {
-    SidedPlaces known{samples.points, samples.normals, samples.points};
+    SidedPlaces known;
+    known.add(samples.points, samples.normals, samples.points);
     for (const FineRegion& region : fine_regions)  // some of these are samples of the energy
-      known.add(region.points, region.normals, region.points);
+      known.add(region.points, region.normals, region.points, region.shares);
     known.add(sites, normals, layout.inner);  // centers of the second layer
     if (axis >= 0) {
       Points reflected[] = {sites, normals, layout.inner};
