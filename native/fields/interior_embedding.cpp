@@ -32,7 +32,7 @@ constexpr double emphasis = 2.0;
 constexpr double smoothing = 10.0, part_smoothing = 1.0, neighbour_spacings = 3.0;
 /// ψ of a part keeps distances of nodes that are near in space before others: up to about so many widths.
 /// The leading coordinates of all distances would lay two of a hand's fingers into each other, since more
-/// than three ends that are equally far from each other need more than three coordinates.
+/// than four ends that are equally far from each other need more than three coordinates.
 constexpr double stress_widths = 4.0;
 /// Spread of ψ, as a fraction of the shape's size, below which Euclidean distances are used.
 constexpr double worthwhile_spread = 0.04;
