@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Undo, redo and reload: what is shown follows from what the file says."""
 
+import contextlib
 import functools
 
 import numpy as np
@@ -12,8 +13,10 @@ if IN_BLENDER:
     from support.blender import scenes
     from support.blender.live import pin, step
 
+    from addon.core.errors import UserError
+    from addon.field_modifier import layers
     from addon.live import live_solver, sessions
-    from addon.pin_tool import drag
+    from addon.pin_tool import drag, operators
     from tests.blender.walk import world
 
 pytestmark = pytest.mark.in_blender
@@ -482,8 +485,9 @@ def test_what_is_refused_or_cancelled_leaves_no_new_data_without_a_step(way):
         assert not world.dangling()
 
 
+@pytest.mark.parametrize("what", ["deform", "handle"])
 @few_centers
-def test_a_job_that_fails_leaves_no_new_data_without_a_step():
+def test_what_fails_on_a_style_leaves_no_new_data_without_a_step(what):
     """The style that it would have acted on comes back with a helper of its own: its mesh is shared."""
     build()
     bar = bpy.data.objects["Bar2"]
@@ -499,8 +503,12 @@ def test_a_job_that_fails_leaves_no_new_data_without_a_step():
         bpy.data.objects["Bar0"].location.z += 1.0
         bpy.context.view_layer.update()
         push("another object")
-    with pytest.raises(RuntimeError, match="away from it"):
-        bpy.ops.arapfields.deform()
+    if what == "deform":
+        with pytest.raises(RuntimeError, match="away from it"):
+            bpy.ops.arapfields.deform()
+    else:
+        with pytest.raises(UserError), layers.way_for_handle(bpy.context, bar):
+            raise UserError("refused")
     assert not world.dangling()
     for _ in range(2):
         bpy.ops.ed.undo()
@@ -533,3 +541,21 @@ def test_undo_of_live_mode_on_a_style_of_a_copy_gives_the_style():
     bpy.ops.ed.undo()
     world.settle()
     assert np.array_equal(scenes.world_points(bpy.data.objects[name]), shown)
+
+
+@few_centers
+def test_a_turn_of_a_pin_that_is_cancelled_is_no_data_without_a_step():
+    """Live mode begins with it, and goes on."""
+    build()
+    bar = bpy.data.objects["Bar0"]
+    for _ in range(3):
+        bpy.data.objects["Bar2"].location.z += 1.0
+        bpy.context.view_layer.update()
+        push("another object")
+    scenes.activate(bar.arapfields.handles[0].empty)
+    with contextlib.suppress(RuntimeError):  # without a window there is no turn by the mouse
+        operators.ARAPFIELDS_OT_pin_turn.invoke(None, bpy.context, None)
+    assert sessions.live and not world.dangling()
+    for _ in range(3):
+        bpy.ops.ed.undo()
+        assert not world.dangling()

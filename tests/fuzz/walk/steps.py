@@ -378,6 +378,7 @@ class AllSteps(Undoing):
         "handle_of",
         "carried_by",
         "field_helper",
+        "item",  # which is carried: by the operators, which bind and give back
     )
 
     def put(self, owner):
