@@ -13,7 +13,7 @@ import bpy
 
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.language import translated
-from ..blender.object_references import settings_of
+from ..blender.object_references import results_of, settings_of
 from ..blender.point_data import points_of
 from ..carried import points
 from ..core.errors import UserError, as_user_error, refuse
@@ -222,7 +222,7 @@ def file_of(modifier, item):
 def is_own(item, path, named):
     """Whether a cache at that path is an earlier bake of the object: it or its result plays it, or the name
     was made of the object's (`named`) and no other object plays it."""
-    results = [entry.item for entry in settings_of(item).results if entry.item is not None]
+    results = [entry.item for entry in results_of(item)]
     if any(plays(one, path) for one in (item, *results)):
         return True
     return named and not any(plays(one, path) for one in bpy.data.objects)

@@ -79,6 +79,18 @@ def lists(source, item):
     return any(entry.item == item for entry in settings_of(source).results)
 
 
+def results_of(source):
+    """The entries of a source's results; a duplicate's list has those of its original, which are left out."""
+    return [entry for entry in settings_of(source).results if is_own_result(source, entry.item)]
+
+
+def is_own_result(source, item):
+    if item is None:
+        return False
+    named = bpy.data.objects.get(settings_of(item).made_from)
+    return named in (None, source) or not lists(named, item)
+
+
 def is_source(item):
     """Whether an object can be a source: a mesh, or a point cloud of splats."""
     return item.type == "MESH" or holds_splats(item)

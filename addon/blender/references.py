@@ -55,6 +55,24 @@ def refuse_new(source):
         raise UserError("{name} needs new data for its motion; start again", source)
 
 
+def referred(items):
+    """{(object, modifier, data path, data-block)}, by their uids, of all that modifiers of nodes refer to."""
+    return {
+        (item.session_uid, one.persistent_uid, path, value.session_uid)
+        for item in items
+        for one in item.modifiers
+        if one.type == "NODES"
+        for path, value in references(one)
+    }
+
+
+def push_new(message, items, before):
+    """Pushes a step if modifiers refer to data that `before`, by referred(), has not: what is refused or
+    cancelled has no step, and undo would leave the references dangling."""
+    if not referred(items) <= before:
+        push(message)
+
+
 def takes_references(block):
     """Whether a data-block can be given references to others of the file. A linked one cannot: undo leaves it
     as it is, with references to what undo has removed, and Blender crashes."""

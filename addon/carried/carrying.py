@@ -194,6 +194,11 @@ def is_carried_otherwise(item, entry, carrier):
     return isinstance(carrier, TransformCarrier) and KINDS.get(item.type, TransformCarrier).is_on(item)
 
 
+def with_carried(source):
+    """A source and the objects that it carries."""
+    return [source, *(entry.item for entry in settings_of(source).carried if entry.item is not None)]
+
+
 def give_back_all(source):
     """Removes the field's motion from all carried objects of a source."""
     for entry in settings_of(source).carried:

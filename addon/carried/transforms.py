@@ -60,9 +60,19 @@ def parent_now(item, depsgraph, now, own):
     if item.parent is None:
         return np.eye(4)
     is_flat = np.linalg.det(own[:3, :3]) == 0.0
-    if not is_flat and not any(constraint.enabled for constraint in item.constraints):
+    is_free = not is_flat and not any(constraint.enabled for constraint in item.constraints)
+    if is_free and not is_plain(item):
         return now @ np.linalg.inv(own)
     return parent_of(item, depsgraph, array(item.parent.evaluated_get(depsgraph).matrix_world), posed=True)
+
+
+def is_plain(item):
+    """Whether the parent's part follows from the parent alone, and so does not change by a rounding as the
+    field moves the object."""
+    parent = item.parent
+    if item.parent_type == "BONE":
+        return item.parent_bone in parent.data.bones
+    return item.parent_type == "OBJECT" and not (parent.type == "CURVE" and parent.data.use_path)
 
 
 def parent_at_rest(item, rigs, depsgraph):

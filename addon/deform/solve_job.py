@@ -231,18 +231,12 @@ def plan_solve_job(
 class SolveOperator(JobOperator):
     """Mixin of jobs that solve a field; refuses results that cannot be placed before the solve."""
 
-    ended_live = False  # whether the operator has ended live mode
-
     ways = ()  # (ObjectReference, Way by make_way()) of sources without a result yet
 
     @classmethod
     def refuses(cls, source):
         """Checks the settings in the user interface only; a script's arguments are checked in `plan`."""
         return placement_refusal(source) if has_window() else None
-
-    def push_undo(self):
-        if self.ended_live:
-            references.push("Live")
 
     def end_live(self, context, source, kind):
         """Ends live mode after all checks, and makes the result that the run acts on a layer."""

@@ -154,11 +154,13 @@ def make_way(source, kind):
 def way_for_handle(context, source):
     """Context manager: make_way() for a new handle, which holds the visible shape; put back after an error.
     Not while a session is live."""
+    before = references.referred([source])
     way = NOTHING if settings_of(source).live_kind else make_way(source, "DEFORM")
     try:
         yield
     except Exception:
         put_back(context, source, way)
+        references.push_new("Handle", [source], before)
         raise
 
 

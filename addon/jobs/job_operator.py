@@ -5,7 +5,7 @@ import types
 
 import bpy
 
-from ..blender import mesh_arrays, vertex_groups
+from ..blender import mesh_arrays, references, vertex_groups
 from ..blender.host import has_window
 from ..blender.language import about, translated
 from ..blender.object_references import (
@@ -142,6 +142,7 @@ class JobOperator(ModalRun, Guided):
 
     title = ""
     worked_on = ()  # ObjectReferences; once all of these objects are deleted, the job ends
+    ended_live = False  # whether the operator has ended live mode
     about = frozenset()  # session_uids of the objects that its messages concern
 
     scope: choice(SCOPES, "Objects", "Which objects to work on", options={"SKIP_SAVE"})
@@ -196,6 +197,7 @@ class JobOperator(ModalRun, Guided):
         """Coroutine of the job's main-thread work; returns the operator's result."""
         self.failures, self.warnings, self.successes = [], [], []
         self.about = active_uids(context)
+        self.referred = references.referred(bpy.data.objects)
         job = jobs.Job(self.title, [], native.library().Task, low_priority=self.in_window)
         jobs.begin(job, start=False)
         try:
@@ -234,6 +236,10 @@ class JobOperator(ModalRun, Guided):
 
     def push_undo(self):
         """Pushes an undo step if a job that applied nothing has changed data: Blender pushes none for it."""
+        if self.ended_live:
+            references.push("Live")
+        else:
+            references.push_new(self.title, bpy.data.objects, self.referred)
 
     def clear_up(self, job):
         """Removes temporary data, however the job has ended."""

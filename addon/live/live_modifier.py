@@ -233,7 +233,7 @@ class LiveModifier:
 
     def bind(self, context, source):
         """Binds the modifier, also after an edit of the source; `before` stays as it is."""
-        motion.bind(context, source, live=True)
+        self.uid = motion.bind(context, source, live=True).persistent_uid
 
     def is_there(self):
         return True
@@ -290,8 +290,12 @@ class LiveModifier:
         return source
 
     def leave(self, source):
-        """After undo to a step without live mode: restores `first` if the mesh still has a live shape."""
-        if mark(source):
+        """After undo to a step without live mode: restores `first` if the mesh still has a live shape.
+
+        Copies of a live mesh have its mark, too: another modifier of that step stays as it is.
+        """
+        modifier = modifier_stack.find(source)
+        if modifier is not None and modifier.persistent_uid == self.uid and mark(source):
             motion.restore(source, self.first)
             put_mark(source, "")
 

@@ -6,6 +6,7 @@ from ..blender.language import translated
 from ..blender.object_references import settings_of, source_of
 from ..blender.property_definitions import choice
 from ..blender.source_operator import ReportingOperator, SourceOperator, with_page
+from ..carried import carrying
 from ..core.errors import UserError, refuse
 from ..core.runtime import jobs
 from ..core.settings.choices import LIVE_KINDS, RESULT_KINDS
@@ -54,6 +55,8 @@ class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
             sessions.end(context, source)
             return {"FINISHED"}
         earlier, was_live = sessions.live.get(source.session_uid), settings_of(source).live_kind
+        moved = carrying.with_carried(source)
+        before = references.referred(moved)
         try:
             # What a refused start takes away comes back without a step of undo.
             with references.unused_kept():
@@ -63,6 +66,8 @@ class ARAPFIELDS_OT_live(ReportingOperator, bpy.types.Operator):
                 sessions.go_back(context, source, earlier.former, earlier.kind)
             if was_live and not settings_of(source).live_kind:  # it cannot go on
                 references.push("Live")
+            else:
+                references.push_new("Live", moved, before)
             return self.refuse(error)
         return {"FINISHED"}
 

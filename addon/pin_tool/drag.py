@@ -3,9 +3,10 @@
 
 from mathutils import Matrix, Vector
 
-from ..blender import modifier_stack
+from ..blender import modifier_stack, references
 from ..blender.language import translated
 from ..blender.object_references import ObjectReference, settings_of
+from ..carried import carrying
 from ..core.runtime import jobs
 from ..field_modifier import layers, motion
 from ..handles import keyframes
@@ -17,10 +18,10 @@ TRANSFORMS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axi
 
 
 class Snapshot:
-    """The state that a drag changes, read before the pin is placed. `ended`, `way`: by make_way()."""
+    """The state that a drag changes, read before the pin is placed. The last arguments are make_way()'s."""
 
-    def __init__(self, context, source, ended=None, way=None):
-        self.ended, self.way = ended, way
+    def __init__(self, context, source, referred, ended, way):
+        self.referred, self.ended, self.way = referred, ended, way
         settings, layer = settings_of(source), context.view_layer
         self.source, session = ObjectReference(source), sessions.live.get(source.session_uid)
         self.live = None if session is None else (session.kind, session.keeps_shape)
@@ -40,6 +41,10 @@ class Snapshot:
             if item is not None:
                 item.select_set(True)
         context.view_layer.objects.active = self.active.find() if self.active else None
+
+    def push_new(self):
+        """A step of undo for new data that live mode has made and that stay."""
+        references.push_new("Live", carrying.with_carried(self.source.get()), self.referred)
 
     def restore_shape(self, context, is_held):
         """Restores the shape and informs the session. `is_held`: it stays until a handle moves."""
@@ -141,6 +146,7 @@ class Drag:
             sessions.end(context, source)
         if self.before.ended is not None:
             sessions.go_back(context, source, *self.before.ended)
+        self.before.push_new()
 
 
 def insert_keys(context, empty):
@@ -162,8 +168,9 @@ def kind_of(source):
 
 
 def make_way(context, source):
-    """layers.make_way() before a drag. Returns (Former, kind) of the session that it has ended, and the Way;
-    None for each that is not there."""
+    """layers.make_way() before a drag. Returns what modifiers referred to before, (Former, kind) of the
+    session that it has ended, and the Way; None for each that is not there."""
+    referred = references.referred(carrying.with_carried(source))
     ended = way = None
     if not sessions.follows_handles(source):
         ended = sessions.end_for_kind(context, source, kind_of(source))
@@ -171,7 +178,7 @@ def make_way(context, source):
         if reason is not None:
             jobs.add_message("WARNING", translated(reason), {source.session_uid})
         way = layers.make_way(source, kind_of(source))
-    return ended, way
+    return referred, ended, way
 
 
 def of_entry(context, source, entry):
@@ -190,4 +197,5 @@ def of_new_pin(context, source, location, radius, **further):
     except Exception:
         pins.discard(source, entry.empty)
         before.restore_selection(context)
+        before.push_new()
         raise

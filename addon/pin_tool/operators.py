@@ -4,11 +4,12 @@
 import bpy
 import numpy as np
 
-from ..blender import host
+from ..blender import host, references
 from ..blender.host import redraw
 from ..blender.object_references import owner_of, select_alone
 from ..blender.property_definitions import flag, number
 from ..blender.source_operator import ReportingOperator
+from ..carried import carrying
 from ..core.errors import UserError
 from ..core.runtime import native
 from ..live import sessions
@@ -345,13 +346,17 @@ class ARAPFIELDS_OT_pin_turn(PinOperator, bpy.types.Operator):
         if empty is None:
             return {"PASS_THROUGH"}
         source = owner_of(empty)
+        moved = carrying.with_carried(source)
+        before = references.referred(moved)
         try:
             drag.begin_live(context, source)
         except (UserError, ValueError) as error:
+            references.push_new("Live", moved, before)
             return self.refuse(error)
         sessions.live[source.session_uid].keeps_shape = True
         pins.entry_of(empty).hold_turn = True
         select_alone(context, empty)
+        references.push_new("Live", moved, before)  # the turn may be cancelled, and live mode goes on
         return bpy.ops.transform.rotate("INVOKE_DEFAULT") and {"FINISHED"}
 
 

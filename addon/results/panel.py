@@ -2,7 +2,7 @@
 import bpy
 
 from ..blender import modifier_stack
-from ..blender.object_references import in_scene
+from ..blender.object_references import in_scene, results_of
 from ..blender.section import Advanced, draw_settings, modifier_row
 from ..names import Op
 
@@ -20,7 +20,7 @@ class ARAPFIELDS_PT_result(Advanced, bpy.types.Panel):
         if modifier is not None:
             modifier_row(layout, modifier, "GEOMETRY_NODES", Op.REMOVE_FIELD)
             layout.operator(Op.APPLY_KEY, icon="SHAPEKEY_DATA")
-        for entry in settings.results:
+        for entry in results_of(source):
             if in_scene(entry.item):
                 row = layout.row()
                 row.prop(entry.item, "name", text="", icon="OBJECT_DATA")

@@ -12,7 +12,7 @@ from mathutils import Matrix
 from ..blender import mesh_arrays, modifier_stack
 from ..blender.evaluation import is_driven, key_at, with_ancestors
 from ..blender.language import translated
-from ..blender.object_references import in_scene, settings_of
+from ..blender.object_references import in_scene, results_of, settings_of
 from ..blender.property_definitions import effective_value
 from ..blender.references import remove_mesh_object, takes_references
 from ..blender.splat_layouts import holds_splats
@@ -49,9 +49,9 @@ def discard(item):
 
 def existing(context, source, kind, output):
     """The result object of an earlier run, if it can be written to; else None."""
-    for entry in settings_of(source).results:
+    for entry in results_of(source):
         item = entry.item
-        if entry.kind == kind and entry.output == output and item is not None:
+        if entry.kind == kind and entry.output == output:
             if item.mode == "EDIT" or item.library or context.scene.objects.get(item.name) != item:
                 continue
             return item
@@ -211,7 +211,7 @@ def add_warp_key(item, before, after):
 
 def source_and_results(source):
     """The source, and its result objects that are in a scene."""
-    results = [entry.item for entry in settings_of(source).results if in_scene(entry.item)]
+    results = [entry.item for entry in results_of(source) if in_scene(entry.item)]
     return [source, *(item for item in results if item != source)]
 
 

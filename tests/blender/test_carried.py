@@ -275,6 +275,31 @@ def test_a_moved_or_edited_one_follows_from_where_it_is():
     assert np.abs(shown(patch) - taken(session, rest)).max() < CLOSE
 
 
+def test_one_under_a_parent_rests_once_the_shape_does():
+    """Its parent's part of its place is the same, to the bit, wherever the field has moved it."""
+    bar, moving = body()
+    spot, parent = rider("EMPTY"), bpy.data.objects.new("Parent", None)
+    bpy.context.collection.objects.link(parent)
+    parent.location, parent.rotation_euler, parent.scale = (0.3, 0.2, 0.1), (0.4, 0.7, 1.1), (1.3, 1.3, 1.3)
+    spot.parent = parent
+    bpy.context.view_layer.update()
+    scenes.activate(spot, bar)
+    assert bpy.ops.arapfields.carry(way="RIGID") == {"FINISHED"}
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    moving.location.z += 0.4
+    step(refined=True)
+    session, seen = sessions.live[bar.session_uid], set()
+    for turn in range(5):
+        parent.rotation_euler.z += 0.1  # it goes on from another place
+        step(refined=True)
+        step(refined=True)
+        requested = session.requested
+        for _ in range(3):
+            step()
+            seen.add((turn, session.requested is requested))
+    assert all(rests for _, rests in seen)
+
+
 def test_a_shirt_of_the_same_armature_is_not_posed_twice():
     bar, rig = rigged_bar()
     shirt = bar.copy()

@@ -108,7 +108,7 @@ def enter(state):
     elif state == "prefetch":
         prefetch.prepare(bpy.context, bar)
     elif state == "drag":
-        before = drag.Snapshot(bpy.context, bar)
+        before = drag.Snapshot(bpy.context, bar, *drag.make_way(bpy.context, bar))
         hover.hover.drag = drag.Drag(bpy.context, before, bpy.data.objects["Moving"])
         hover.hover.drag.move(bpy.context, (1.0, 0.0, 0.3))
     elif state == "job":

@@ -306,3 +306,41 @@ def test_a_linked_object_does_not_point_to_its_result():
     bpy.ops.ed.undo()
     bpy.context.view_layer.update()
     assert "Bar_implicit" not in bpy.data.objects
+
+
+def with_result():
+    """(bar, its result, a duplicate of the bar with handles of its own, aside)."""
+    bar, *_ = scenes.bar_with_handles()
+    bpy.ops.arapfields.deform(result="NEW", **scenes.QUICK)
+    result = bpy.data.objects["Bar_deformed"]
+    bar.hide_set(False)
+    scenes.activate(bar, *(entry.empty for entry in bar.arapfields.handles))
+    bpy.context.view_layer.objects.active = bar
+    bpy.ops.object.duplicate()
+    copied = bpy.data.objects["Bar.001"]
+    return bar, result, copied
+
+
+def test_a_duplicate_has_results_of_its_own():
+    """Its list names those of the object of which it is the copy; these stay."""
+    bar, result, copied = with_result()
+    mesh, place = result.data, result.location.copy()
+    for item in (copied, *(entry.empty for entry in copied.arapfields.handles)):
+        item.location.y += 5.0
+    bpy.context.view_layer.update()
+    scenes.activate(copied)
+    bpy.ops.arapfields.deform(result="NEW", **scenes.QUICK)
+    assert result.data == mesh and result.location == place
+    assert [entry.item for entry in bar.arapfields.results] == [result]
+    (entry,) = copied.arapfields.results
+    assert entry.item != result and abs(entry.item.location.y - 5.0) < 1e-6
+
+
+def test_live_mode_of_a_duplicate_hides_no_result_of_another():
+    """A duplicate at the same place."""
+    _, result, copied = with_result()
+    scenes.activate(copied)
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    assert not result.hide_get() and not result.hide_render
+    assert bpy.ops.arapfields.live() == {"FINISHED"}
+    assert not result.hide_get() and not result.hide_render

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Undo, redo and reload: what is shown follows from what the file says."""
 
+import contextlib
 import functools
 
 import numpy as np
@@ -12,8 +13,10 @@ if IN_BLENDER:
     from support.blender import scenes
     from support.blender.live import pin, step
 
+    from addon.core.errors import UserError
+    from addon.field_modifier import layers
     from addon.live import live_solver, sessions
-    from addon.pin_tool import drag
+    from addon.pin_tool import drag, operators
     from tests.blender.walk import world
 
 pytestmark = pytest.mark.in_blender
@@ -449,3 +452,110 @@ def test_undo_goes_past_a_step_in_which_live_mode_fails():
         step(refined=True)
     bar = bpy.data.objects["Bar"]
     assert len(bar.arapfields.handles) == 2 and sessions.is_live(bar)
+
+
+@pytest.mark.parametrize("way", ["live", "drag", "new pin"])
+@few_centers
+def test_what_is_refused_or_cancelled_leaves_no_new_data_without_a_step(way):
+    """A duplicate shares the helper; live mode makes one of its own, which stays at the modifier."""
+    build()
+    bar = bpy.data.objects["Bar0"]
+    take("deform", bar)
+    take("duplicate", bar)
+    scenes.activate(bar)
+    handle = bar.arapfields.handles[0]
+    if way == "live":
+        handle.kind = "POINT"
+        handle.empty.location.x -= 50.0  # too far off, as the worker finds
+        assert bpy.ops.arapfields.set_rest(all=True) == {"FINISHED"}
+    for _ in range(3):  # the bar stays in memory, as it is, when the last of these is undone
+        bpy.data.objects["Bar2"].location.z += 1.0
+        bpy.context.view_layer.update()
+        push("another object")
+    if way == "live":
+        with pytest.raises(RuntimeError, match="live mode ended"):
+            bpy.ops.arapfields.live()
+    elif way == "drag":
+        drag.of_entry(bpy.context, bar, handle).cancel(bpy.context)
+    else:
+        drag.of_new_pin(bpy.context, bar, scenes.world_points(bar)[0], 0.2).cancel(bpy.context)
+    assert not world.dangling() and not sessions.live
+    for _ in range(2):
+        bpy.ops.ed.undo()
+        assert not world.dangling()
+
+
+@pytest.mark.parametrize("what", ["deform", "handle"])
+@few_centers
+def test_what_fails_on_a_style_leaves_no_new_data_without_a_step(what):
+    """The style that it would have acted on comes back with a helper of its own: its mesh is shared."""
+    build()
+    bar = bpy.data.objects["Bar2"]
+    scenes.activate(bar)
+    assert bpy.ops.arapfields.stylize() == {"FINISHED"}
+    bpy.ops.object.duplicate(linked=True)
+    scenes.activate(bar)
+    handle = bar.arapfields.handles[0]
+    handle.kind = "POINT"
+    handle.empty.location.x -= 50.0  # too far off, as the worker finds
+    assert bpy.ops.arapfields.set_rest(all=True) == {"FINISHED"}
+    for _ in range(3):
+        bpy.data.objects["Bar0"].location.z += 1.0
+        bpy.context.view_layer.update()
+        push("another object")
+    if what == "deform":
+        with pytest.raises(RuntimeError, match="away from it"):
+            bpy.ops.arapfields.deform()
+    else:
+        with pytest.raises(UserError), layers.way_for_handle(bpy.context, bar):
+            raise UserError("refused")
+    assert not world.dangling()
+    for _ in range(2):
+        bpy.ops.ed.undo()
+        assert not world.dangling()
+
+
+@few_centers
+def test_undo_of_live_mode_on_a_style_of_a_copy_gives_the_style():
+    """The copy's mesh still has the mark of the live shape of which it is the copy of a copy."""
+    build()
+    bar = bpy.data.objects["Bar2"]
+    take("live", bar)
+    push("live")
+    world.settle()
+    for linked in (True, False):
+        for entry in bar.arapfields.handles if not linked else ():
+            entry.empty.select_set(True)
+        bpy.ops.object.duplicate(linked=linked)
+        push("duplicate")
+        world.settle()
+    copied = bpy.context.object
+    assert bpy.ops.arapfields.stylize() == {"FINISHED"}
+    push("stylize")
+    world.settle()
+    shown = scenes.world_points(copied)
+    name = copied.name
+    take("live", copied)
+    push("live")
+    world.settle()
+    bpy.ops.ed.undo()
+    world.settle()
+    assert np.array_equal(scenes.world_points(bpy.data.objects[name]), shown)
+
+
+@few_centers
+def test_a_turn_of_a_pin_that_is_cancelled_is_no_data_without_a_step():
+    """Live mode begins with it, and goes on."""
+    build()
+    bar = bpy.data.objects["Bar0"]
+    for _ in range(3):
+        bpy.data.objects["Bar2"].location.z += 1.0
+        bpy.context.view_layer.update()
+        push("another object")
+    scenes.activate(bar.arapfields.handles[0].empty)
+    with contextlib.suppress(RuntimeError):  # without a window there is no turn by the mouse
+        operators.ARAPFIELDS_OT_pin_turn.invoke(None, bpy.context, None)
+    assert sessions.live and not world.dangling()
+    for _ in range(3):
+        bpy.ops.ed.undo()
+        assert not world.dangling()

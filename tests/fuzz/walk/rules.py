@@ -154,7 +154,8 @@ class All:
         if (name == "undo" and self.position == 0) or (name == "redo" and at_end):
             return None
         may_move = any(settings_of(item).result in ("REPLACE", "KEY") for item in world.sources())
-        points, was_live, pushed = world.rest(), dict(sessions.live), references.pushed
+        points, pushed = world.rest(), references.pushed
+        was_live = bool(sessions.live or sessions.live.paused)
         said = self.steps.take(name, seed)
         if said is None and pushed == references.pushed:
             if self.history[self.position] is not None:

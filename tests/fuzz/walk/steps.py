@@ -378,6 +378,7 @@ class AllSteps(Undoing):
         "handle_of",
         "carried_by",
         "field_helper",
+        "item",  # which is carried: by the operators, which bind and give back
     )
 
     def put(self, owner):
@@ -417,7 +418,9 @@ class AllSteps(Undoing):
         return f"{empty.name} moved"
 
     def pin(self):
-        if pins.refusal(self.source) is not None or not len(self.source.data.vertices):
+        if not pins.is_own(self.source) or pins.refusal(self.source) is not None:
+            return None  # the tool pins no results
+        if not len(self.source.data.vertices):
             return None
         points = scenes.world_points(self.source)
         if not len(points):
@@ -582,6 +585,8 @@ class AllSteps(Undoing):
         keys, way = self.source.data.shape_keys, self.rng.integers(3)
         if keys is None or way == 0:
             self.source.shape_key_add(name="Key", from_mix=False)
+        elif way == 1 and keys.animation_data is not None:
+            return None  # keyframes say the values
         elif way == 1:
             self.one_of(keys.key_blocks).value = float(self.rng.random())
         else:
