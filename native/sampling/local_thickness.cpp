@@ -13,9 +13,9 @@
 namespace arapfields {
 namespace {
 
-constexpr Index most_nodes = 1500, most_witnesses = 6000;
-/// Samples for each node in a fine region, which has few.
-constexpr Index samples_a_node = 2;
+constexpr Index most_witnesses = 6000;
+/// Points of a fine region, which has few, for each place where it is measured.
+constexpr Index points_a_place = 2;
 /// The limits, as fractions of the radius of gyration.
 constexpr double most_share = 0.6, least_share = 0.02;
 /// The most of an open sheet, as a fraction of the square root of its area.
@@ -30,14 +30,13 @@ constexpr double smooth_share = 0.5, blend_spacings = 1.0;
 }  // namespace
 
 LocalThickness::LocalThickness(PointsIn samples, PointsIn normals, const std::vector<std::uint32_t>& order,
-                               const Vector& sheet_sizes) {
-  const Index node_count = std::min(most_nodes, std::max<Index>(samples.rows() / samples_a_node, 1));
+                               const Vector& sheet_sizes, Index most) {
   const bool extended = (samples.rowwise() - samples.row(0)).cwiseAbs().maxCoeff() > 0.0;
   const double gyration =
       extended ? Frame::balanced(samples, Vector::Ones(samples.rows()), {}, 1.0).scale : 1.0;
   most_ = median_ = most_share * gyration;
   if (!extended || normals.rows() != samples.rows()) return;
-  const std::vector<Index> chosen = evenly(order, node_count), witness_rows = evenly(order, most_witnesses);
+  const std::vector<Index> chosen = evenly(order, most), witness_rows = evenly(order, most_witnesses);
   nodes_ = samples(chosen, Eigen::all);
   const Points node_normals = normals(chosen, Eigen::all);
   const Points witnesses = samples(witness_rows, Eigen::all),
@@ -98,7 +97,8 @@ struct LocalThickness::Fine {
 
 void LocalThickness::refine(const FineRegion& region) {
   fine_.push_back(std::make_shared<const Fine>(
-      Fine{region, LocalThickness(region.points, region.normals, canonical_order(region.points))}));
+      Fine{region, LocalThickness(region.points, region.normals, canonical_order(region.points), {},
+                                  region.points.rows() / points_a_place)}));
 }
 
 Points LocalThickness::thinner_than(double thickness) const {

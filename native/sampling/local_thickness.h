@@ -21,9 +21,10 @@ class LocalThickness {
  public:
   /// From samples (n,3) of a surface and their outward unit normals (n,3); without normals it is the upper
   /// limit everywhere. `order` is a spatially coherent permutation of the samples, `sheet_sizes` (n; empty:
-  /// all 0) the square root of the area of the open sheet that each lies on, 0 on no sheet.
+  /// all 0) the square root of the area of the open sheet that each lies on, 0 on no sheet. It is measured at
+  /// no more than `most` of the samples.
   LocalThickness(PointsIn samples, PointsIn normals, const std::vector<std::uint32_t>& order,
-                 const Vector& sheet_sizes = {});
+                 const Vector& sheet_sizes = {}, Index most = 1500);
 
   /// Measures the thickness in a fine region anew, at its own points.
   void refine(const FineRegion& region);
