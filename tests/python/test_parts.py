@@ -9,6 +9,7 @@ import pytest
 import trimesh
 from support.files import archives
 from support.geometry import cases, contact_cases, meshes
+from support.geometry.blocks import block_surface
 from support.geometry.cases import box, moved, shift, turn
 from support.geometry.characters import FOOT, HIP, LEG, figure, trousers
 from support.geometry.meshes import check_closed, handle_box, read, turned
@@ -209,6 +210,7 @@ GAPS = [0.2, 0.02, 0.004, 0.0]
 ROUNDED = 1e-9  # of normals summed in another order
 # A jaw of size 1 turned by 25° about its hinge; a field of finite resolution rounds the slit's end.
 JAW_ERROR = 0.042  # seen .0402 where the slit is open
+LEFT = 0.01  # of the way of what is pulled; seen .003
 
 
 @functools.cache
@@ -234,6 +236,57 @@ def test_the_jaws_of_a_slit_bar_come_apart(gap):
     deformed = field.apply(vertices, triangles=triangles)
     assert max(jaw_errors(vertices, jaws, deformed)) < JAW_ERROR
     assert field.report.min_determinant > 0.0
+
+
+def boxes_that_touch(gap):
+    """By name: boxes (low, high) whose union is the shape, the box that is held, the one that is turned, how,
+    and where nothing is to move."""
+    return {
+        "a leg": (
+            [((-0.2, -0.1, 0), (0.2, 0.1, 0.6)), ((-0.2, -0.1, -0.8), (-gap / 2, 0.1, 0)),
+             ((gap / 2, -0.1, -0.8), (0.2, 0.1, 0))],
+            ((-0.2, -0.1, 0.4), (0.2, 0.1, 0.6)), ((0.05, -0.1, -0.8), (0.2, 0.1, -0.7)),
+            turn((0, 1, 0), -25, (0.1, 0, 0)), ((-0.2, -0.1, -0.8), (-gap / 2, 0.1, -0.4)),
+        ),
+        "an arm": (
+            [((-0.2, -0.1, 0), (0.2, 0.1, 0.8)), ((0.2 + gap, -0.06, 0.1), (0.3 + gap, 0.06, 0.8)),
+             ((0.2, -0.06, 0.7), (0.3 + gap, 0.06, 0.8))],
+            ((-0.2, -0.1, 0), (0.2, 0.1, 0.1)), ((0.22 + gap, -0.06, 0.1), (0.3 + gap, 0.06, 0.2)),
+            turn((0, 1, 0), 30, (0.25, 0, 0.75)), ((0.1, -0.1, 0.1), (0.2, 0.1, 0.5)),
+        ),
+        "a page": (
+            [((0, 0, 0), (0.05, 0.7, 0.05 + gap)), ((0.05, 0, 0), (0.6, 0.7, 0.025)),
+             ((0.05, 0, 0.025 + gap), (0.6, 0.7, 0.05 + gap))],
+            ((0.5, 0, 0), (0.6, 0.7, 0.02)), ((0.5, 0, 0.03 + gap), (0.6, 0.7, 0.05 + gap)),
+            turn((0, 1, 0), -40, (0.03, 0, 0.04)), ((0.3, 0, 0), (0.6, 0.7, 0.025)),
+        ),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", boxes_that_touch(0.0))
+@pytest.mark.parametrize("gap", [0.004, 0.0005])
+def test_what_touches_at_rest_is_left_where_it_is(name, gap):
+    blocks, held, pulled, motion, other = boxes_that_touch(gap)[name]
+    vertices, triangles = block_surface(blocks, (0.05, 0.05, 0.05))
+    samples = af.sample_mesh(vertices, triangles)
+    handles = [
+        af.CuboidHandle(box, motion_of @ box)
+        for box, motion_of in ((around(*held), np.eye(4)), (around(*pulled), motion))
+    ]
+
+    def inside(low, high):
+        return ((vertices >= np.array(low) - 1e-6) & (vertices <= np.array(high) + 1e-6)).all(axis=1)
+
+    live = af.LiveDeformer(samples, handles).solve(iterations=100, tolerance=1e-6)
+    for field in [live] if gap < 0.004 else [live, af.deform(samples, handles)]:
+        moved = np.linalg.norm(field.apply(vertices, triangles=triangles) - vertices, axis=1)
+        assert moved[inside(*pulled)].mean() > 0.3
+        assert moved[inside(*other)].max() < LEFT * moved[inside(*pulled)].mean()
+
+
+def around(low, high):
+    low, high = np.array(low, float) - 1e-3, np.array(high, float) + 1e-3
+    return handle_box(0.5 * (low + high), 0.5 * (high - low))
 
 
 def test_a_closed_slit_costs_what_an_open_one_does():
