@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The solver of a live session on its worker, and one that is set up before a session starts."""
 
+import collections
 import time
 
 import numpy as np
@@ -97,7 +98,9 @@ NEAR, LATEST = 7e-4, 0.2
 TOLERANCE = 3e-5  # limit of single precision; the last shape is within about 0.3 % of the size
 # A time step of secondary motion is one to MOST_PACES times PACE seconds: each length has its preconditioner.
 PACE, MOST_PACES = 1 / 60, 3
-STILL, STILL_STEPS = 1e-3, 20  # at rest: below this share of the size per second, for so many steps
+# Secondary motion is at rest once all shapes of so many steps are within this share of the size, by so many
+# of their points. Its speed would not tell: of a shape that is stretched, steps tremble by rounding for ever.
+STILL, STILL_STEPS, STILL_POINTS = 2e-3, 60, 1000
 
 
 class LiveSolver:
@@ -188,10 +191,13 @@ class LiveSolver:
 
     def _settle(self, request, token):
         """Yields shapes in real time until the motion has come to rest."""
-        still, size = 0, np.ptp(self.samples.points, axis=0).max()
-        while still < STILL_STEPS and not token.cancelled:
+        size, last = np.ptp(self.samples.points, axis=0).max(), collections.deque(maxlen=STILL_STEPS)
+        while not token.cancelled:
             began = time.monotonic()
             self._step(request)
-            still = still + 1 if self.report.speed < STILL * size else 0
             yield self.frame_solver.tracked_shape(request)
+            points = self.frame_solver.solver.tracked()
+            last.append(points[:: max(1, len(points) // STILL_POINTS)].copy())
+            if len(last) == STILL_STEPS and np.abs(np.array(last) - last[-1]).max() < STILL * size:
+                break
             time.sleep(max(0.0, began + PACE - time.monotonic()))
