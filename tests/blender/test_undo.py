@@ -454,6 +454,21 @@ def test_undo_goes_past_a_step_in_which_live_mode_fails():
     assert len(bar.arapfields.handles) == 2 and sessions.is_live(bar)
 
 
+def move_another(name):
+    """Three steps of undo; what they do not change stays in memory, as it is, when the last one is undone."""
+    for _ in range(3):
+        bpy.data.objects[name].location.z += 1.0
+        bpy.context.view_layer.update()
+        push("another object")
+
+
+def put_far_off(handle):
+    """The handle rests too far from the surface, which the worker finds."""
+    handle.kind = "POINT"
+    handle.empty.location.x -= 50.0
+    assert bpy.ops.arapfields.set_rest(all=True) == {"FINISHED"}
+
+
 @pytest.mark.parametrize("way", ["live", "drag", "new pin"])
 @few_centers
 def test_what_is_refused_or_cancelled_leaves_no_new_data_without_a_step(way):
@@ -465,13 +480,8 @@ def test_what_is_refused_or_cancelled_leaves_no_new_data_without_a_step(way):
     scenes.activate(bar)
     handle = bar.arapfields.handles[0]
     if way == "live":
-        handle.kind = "POINT"
-        handle.empty.location.x -= 50.0  # too far off, as the worker finds
-        assert bpy.ops.arapfields.set_rest(all=True) == {"FINISHED"}
-    for _ in range(3):  # the bar stays in memory, as it is, when the last of these is undone
-        bpy.data.objects["Bar2"].location.z += 1.0
-        bpy.context.view_layer.update()
-        push("another object")
+        put_far_off(handle)
+    move_another("Bar2")
     if way == "live":
         with pytest.raises(RuntimeError, match="live mode ended"):
             bpy.ops.arapfields.live()
@@ -496,13 +506,8 @@ def test_what_fails_on_a_style_leaves_no_new_data_without_a_step(what):
     bpy.ops.object.duplicate(linked=True)
     scenes.activate(bar)
     handle = bar.arapfields.handles[0]
-    handle.kind = "POINT"
-    handle.empty.location.x -= 50.0  # too far off, as the worker finds
-    assert bpy.ops.arapfields.set_rest(all=True) == {"FINISHED"}
-    for _ in range(3):
-        bpy.data.objects["Bar0"].location.z += 1.0
-        bpy.context.view_layer.update()
-        push("another object")
+    put_far_off(handle)
+    move_another("Bar0")
     if what == "deform":
         with pytest.raises(RuntimeError, match="away from it"):
             bpy.ops.arapfields.deform()
@@ -548,10 +553,7 @@ def test_a_turn_of_a_pin_that_is_cancelled_is_no_data_without_a_step():
     """Live mode begins with it, and goes on."""
     build()
     bar = bpy.data.objects["Bar0"]
-    for _ in range(3):
-        bpy.data.objects["Bar2"].location.z += 1.0
-        bpy.context.view_layer.update()
-        push("another object")
+    move_another("Bar2")
     scenes.activate(bar.arapfields.handles[0].empty)
     with contextlib.suppress(RuntimeError):  # without a window there is no turn by the mouse
         operators.ARAPFIELDS_OT_pin_turn.invoke(None, bpy.context, None)
