@@ -129,7 +129,7 @@ FoldRepair::Nodes FoldRepair::close_nodes(Index triangle) const {
     double shortest = INFINITY;
     std::int32_t next = -1;
     for (const std::int32_t i : result)
-      surface_.edges(i, [&](Index neighbour, double) {
+      surface_.edges(i, [&](Index neighbour, const auto&) {
         const auto j = static_cast<std::int32_t>(neighbour);
         const double length = distance(i, j);
         if (length >= shortest || std::find(result.begin(), result.end(), j) != result.end()) return;
@@ -148,9 +148,9 @@ FoldRepair::Nodes FoldRepair::close_nodes(Index triangle) const {
 Mat3 FoldRepair::turn_of(const Nodes& nodes, const Points& shape) const {
   Mat3 spread = Mat3::Zero();
   for (const std::int32_t node : nodes)
-    surface_.edges(node, [&](Index j, double weight) {
-      spread +=
-          weight * (positions_.row(j) - positions_.row(node)).transpose() * (shape.row(j) - shape.row(node));
+    surface_.edges(node, [&](Index j, const auto& edge) {
+      spread += edge.weight * (positions_.row(j) - positions_.row(node)).transpose() *
+                (shape.row(j) - shape.row(node));
     });
   return closest_rotation(spread);
 }
@@ -223,10 +223,10 @@ FoldRepair::Nodes FoldRepair::relax(Index triangle, int rings) {
         const Mat3& own = turns[i];
         Vec3 sum = Vec3::Zero();
         double weights = 0.0;
-        surface_.edges(i, [&](Index j, double weight) {
-          const Vec3 edge = rest.row(i) - rest.row(j), place = positions_.row(j);
-          sum += weight * (place + 0.5 * (own + turn_at(j, own)) * edge);
-          weights += weight;
+        surface_.edges(i, [&](Index j, const auto& edge) {
+          const Vec3 place = positions_.row(j);
+          sum += edge.weight * place + 0.5 * (own + turn_at(j, own)) * edge.rest;
+          weights += edge.weight;
         });
         positions_.row(i) = sum / weights;
       }

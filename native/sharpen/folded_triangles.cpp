@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "sharpen/folded_triangles.h"
 
+#include <algorithm>
+
 #include "core/errors.h"
 #include "core/parallel.h"
 
@@ -54,6 +56,7 @@ std::vector<Index> folded_triangles(PointsIn vertices, TrianglesIn triangles, Po
   std::vector<Index> result;
   for (Index t = 0; t < surface.triangles(); ++t)
     if (folded[t]) result.push_back(surface.row_of()[t]);
+  std::sort(result.begin(), result.end());
   return result;
 }
 

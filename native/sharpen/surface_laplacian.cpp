@@ -190,14 +190,21 @@ void SurfaceLaplacian::cycle(std::size_t l) {
     for (Index i = begin; i < end; ++i)
       level.smoothed.row(i) = damping * level.matrix.inverse_diagonal[i] * level.residual.row(i);
   });
+  level.solution.resize(size, 3);  // at first the residual that is left
+  parallel_for(0, size, laplacian_grain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i)
+      if (is_still(l, i))
+        level.solution.row(i).setZero();
+      else
+        level.solution.row(i) = level.residual.row(i) - level.matrix.times(level.smoothed, i);
+  });
   Level& coarser = levels_[l + 1];
   coarser.residual.resize(coarser.matrix.size(), 3);
   parallel_for(0, coarser.matrix.size(), laplacian_grain, [&](Index begin, Index end) {
     for (Index g = begin; g < end; ++g) {
       Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
       for (std::int32_t at = level.first[g]; at < level.first[g + 1]; ++at)
-        if (const std::int32_t i = level.members[at]; !is_still(l, i))
-          sum += level.residual.row(i) - level.matrix.times(level.smoothed, i);
+        sum += level.solution.row(level.members[at]);
       coarser.residual.row(g) = sum;
     }
   });
@@ -207,12 +214,9 @@ void SurfaceLaplacian::cycle(std::size_t l) {
       if (const std::int32_t g = level.group_of[i]; g >= 0 && !is_still(l, i))
         level.smoothed.row(i) += coarser.sum.row(g);
   });
-  level.solution.resize(size, 3);
   parallel_for(0, size, laplacian_grain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i)
-      if (is_still(l, i))
-        level.solution.row(i).setZero();
-      else
+      if (!is_still(l, i))
         level.solution.row(i) =
             level.smoothed.row(i) + damping * level.matrix.inverse_diagonal[i] *
                                         (level.residual.row(i) - level.matrix.times(level.smoothed, i));
@@ -238,16 +242,17 @@ void SurfaceLaplacian::conjugate_gradients(std::size_t l, int most, double toler
   }
   level.sum.setZero(size, 3);
   level.direction = level.solution;
+  const double enough = tolerance * tolerance * product(level.residual, level.residual);
   double now = product(level.residual, level.solution);
-  const double enough = tolerance * tolerance * now;
-  for (int iteration = 1; now > enough; ++iteration) {
+  for (int iteration = 1; now > 0.0; ++iteration) {
     const double length = now / multiply(l, level.direction, level.image);
-    parallel_for(0, size, laplacian_grain, [&](Index begin, Index end) {
+    const double left = sum_over(size, [&](Index begin, Index end) {
       const auto rows = [&](auto& all) { return all.middleRows(begin, end - begin); };
       rows(level.sum) += length * rows(level.direction);
       rows(level.residual) -= length * rows(level.image);
+      return rows(level.residual).squaredNorm();
     });
-    if (iteration == most) break;
+    if (iteration == most || left <= enough) break;
     cycle(l);
     const double share = -length * product(level.image, level.solution) / now;
     now = product(level.residual, level.solution);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
+#include "distance/morton.h"
 #include "energies/rotation.h"
 #include "mesh/is_closed.h"
 
@@ -43,8 +44,11 @@ WeldedSurface::WeldedSurface(const TriangleMesh& mesh, PointsIn moved, const Pro
   std::vector<Vec3> cotangents;
   node_of_.assign(count, -1);
   std::vector<std::int32_t> kept;
-  for (Index t = 0; t < mesh.triangles.rows(); ++t) {
-    if (t % check_every == 0) progress.check();
+  Points places(mesh.triangles.rows(), 3);
+  for (Index t = 0; t < places.rows(); ++t) places.row(t) = mesh.vertices.row(mesh.triangles(t, 0));
+  Index visited = 0;
+  for (const std::uint32_t t : morton_order(places)) {
+    if (visited++ % check_every == 0) progress.check();
     const auto corner = [&](int k) -> Vec3 { return mesh.vertices.row(mesh.triangles(t, k % 3)); };
     const double area = (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
     double longest = 0.0;
@@ -98,7 +102,14 @@ WeldedSurface::WeldedSurface(const TriangleMesh& mesh, PointsIn moved, const Pro
   for (Index i = 0; i < nodes(); ++i)
     std::copy_n(lists.begin() + 2 * first_[i], first_neighbour_[i + 1] - first_neighbour_[i],
                 neighbours_.begin() + first_neighbour_[i]);
-  edge_weights_ = edge_weights(Vector::Ones(triangles()));
+  const std::vector<double> edge_weights = this->edge_weights(Vector::Ones(triangles()));
+  edges_.resize(neighbours_.size());
+  parallel_for(0, nodes(), surface_grain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i)
+      for (std::int32_t at = first_neighbour_[i]; at < first_neighbour_[i + 1]; ++at)
+        edges_[at] = {edge_weights[at] * (rest_.row(i) - rest_.row(neighbours_[at])).transpose(),
+                      edge_weights[at]};
+  });
 }
 
 Points WeldedSurface::at_nodes(PointsIn moved) const {
@@ -132,9 +143,8 @@ std::vector<double> WeldedSurface::edge_weights(const Vector& factors) const {
 
 Mat3 WeldedSurface::spread(Index node, const Points& positions) const {
   Mat3 result = Mat3::Zero();
-  edges(node, [&](Index j, double weight) {
-    const Vec3 rest = weight * (rest_.row(j) - rest_.row(node));
-    result += (positions.row(j) - positions.row(node)).transpose() * rest.transpose();
+  edges(node, [&](Index j, const Edge& edge) {
+    result += (positions.row(node) - positions.row(j)).transpose() * edge.rest.transpose();
   });
   return result;
 }

@@ -10,7 +10,8 @@
 namespace arapfields {
 
 /// A mesh as one surface: vertices that are at one place before and after its motion are one node, and
-/// triangles without area are left out. The order of all sums follows from the mesh alone.
+/// triangles without area are left out. Nodes and triangles near in space are near in memory, and the order
+/// of all sums follows from the mesh alone.
 class WeldedSurface {
  public:
   /// The mesh must be valid, with as many moved vertices.
@@ -48,11 +49,16 @@ class WeldedSurface {
   /// first_neighbour()[i] on.
   const std::vector<std::int32_t>& first_neighbour() const { return first_neighbour_; }
   const std::vector<std::int32_t>& neighbours() const { return neighbours_; }
-  /// Those of one node: each neighbour j, and the edge's weight.
+  /// From a neighbour to a node at rest, times the edge's weight: Σ of those in its triangles.
+  struct Edge {
+    Vec3 rest;
+    double weight;
+  };
+  /// Those of one node: each neighbour j, and the edge from it.
   template <class Visit>
   void edges(Index node, Visit&& visit) const {
     for (std::int32_t at = first_neighbour_[node]; at < first_neighbour_[node + 1]; ++at)
-      visit(static_cast<Index>(neighbours_[at]), edge_weights_[at]);
+      visit(static_cast<Index>(neighbours_[at]), edges_[at]);
   }
   /// Of the edge to each of neighbours(): Σ of the weights in its triangles, times their factors (m').
   std::vector<double> edge_weights(const Vector& factors) const;
@@ -75,7 +81,7 @@ class WeldedSurface {
   std::vector<std::int32_t> around_;  // its corners of triangles
   std::vector<std::int32_t> first_neighbour_;
   std::vector<std::int32_t> neighbours_;
-  std::vector<double> edge_weights_;
+  std::vector<Edge> edges_;  // to each of them
 };
 
 }  // namespace arapfields
