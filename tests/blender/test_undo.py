@@ -166,6 +166,40 @@ def test_live_mode_that_waits_goes_on_once_what_is_wrong_is_mended(mend):
 
 
 @few_centers
+@pytest.mark.parametrize("linked", [False, True])
+@pytest.mark.parametrize("name", ["Bar0", "Bar2"])
+def test_a_duplicate_keeps_its_shape_whatever_the_live_original_does(name, linked):
+    """Also where modifiers make vertices or the mesh is shared, so that offsets lie on a helper."""
+    build()
+    bar = bpy.data.objects[name]
+    take("live", bar)
+    world.settle()
+    bpy.ops.ed.undo_push(message="live")
+    scenes.activate(bar)
+    bpy.ops.object.duplicate(linked=linked)
+    copy = bpy.context.object.name
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="duplicated")
+    world.settle()
+    shown = scenes.world_points(bpy.data.objects[copy])
+
+    def stays():
+        world.settle()
+        assert not world.dangling()
+        assert np.array_equal(scenes.world_points(bpy.data.objects[copy]), shown)
+
+    for way in (0.3, -0.2):
+        bpy.data.objects[name].arapfields.handles[1].empty.location.z += way
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message="moved")
+        stays()
+    for step in ("undo", "undo", "redo", "redo", "undo"):
+        getattr(bpy.ops.ed, step)()
+        stays()
+        assert sessions.is_live(bpy.data.objects[name])
+
+
+@few_centers
 def test_a_live_object_of_its_own_comes_back_by_undo():
     build()
     bar = bpy.data.objects["Bar2"]
