@@ -61,6 +61,8 @@ def set_positions(mesh, points):
     """Sets the positions of a mesh's vertices."""
     elements, name = position_vectors(mesh)
     put_vectors(elements, points, name)
+    if len(points):  # by this alone Blender 4 measures the bounding box anew
+        points_of(mesh)[0].co = points[0]
     mesh.update()
 
 
@@ -180,14 +182,13 @@ def fill(mesh, vertices, topology):
     mesh.loops.add(topology.corners.size)
     mesh.polygons.add(len(topology.corners))
     data = mesh.attributes
-    put_vectors(data["position"].data, vertices)
     data[".edge_verts"].data.foreach_set("value", topology.edges.ravel())
     data[".corner_vert"].data.foreach_set("value", topology.corners.ravel())
     data[".corner_edge"].data.foreach_set("value", topology.corner_edges.ravel())
     mesh.polygons.foreach_set("loop_start", np.arange(0, topology.corners.size, 3, dtype=np.int32))
     if topology.materials is not None:
         mesh.polygons.foreach_set("material_index", topology.materials)
-    mesh.update()
+    set_positions(mesh, vertices)
 
 
 def take_geometry(mesh, given):

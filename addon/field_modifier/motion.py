@@ -60,8 +60,8 @@ def write_silenced(source, noted):
 #
 # Offsets are attributes of the mesh itself, or of a helper mesh in no scene if earlier modifiers make the
 # vertices, or if the mesh is linked or shared with other objects. While an object is live it has a helper
-# in any case, empty if it is not needed: it may be needed between two steps of undo
-# (blender/references.py).
+# in any case, empty if it is not needed, and another one that nothing uses, which it takes when a duplicate
+# has come to share the first: both may be needed between two steps of undo (blender/references.py).
 
 written = set()  # session_uids of objects that the add-on itself has moved since the last depsgraph update
 
@@ -107,6 +107,8 @@ def bind(context, source, expected=None, live=False):
     earlier, moved = carrier(source, modifier), snapshot(source)
     if live or not on_mesh:
         take_helper(source, modifier)
+    if live and not references.is_between and unused_helper(source) is None:
+        new_helper(source)
     if on_mesh:
         leave_helper(modifier, live)
     else:
@@ -155,21 +157,35 @@ def take_group(modifier, group):
 
 
 def take_helper(source, modifier):
-    """Gives the modifier a helper of its own, unless it has one; between two steps of undo also one that it
-    shares with a duplicate will do. Returns it."""
+    """Gives the modifier a helper of its own, unless it has one; between two steps of undo, where none is at
+    hand, also one that it shares with a duplicate will do. Returns it."""
     helper = node_group.get(modifier, "Offsets")
-    if helper is not None and helper.library is None and (users_of(helper) == 1 or references.is_between):
+    is_ours = helper is not None and helper.library is None
+    if is_ours and users_of(helper) == 1:
         return helper
     own = unused_helper(source)
     if own is None:
+        if is_ours and references.is_between:
+            return helper
         references.refuse_new(source)
-        mesh = bpy.data.meshes.new(f"{source.name}{HELPER_SUFFIX}")
-        own = bpy.data.objects.new(mesh.name, mesh)
+        own = new_helper(source)
     if helper is not None:
         mesh_arrays.take_geometry(own.data, helper.data)
         write_to(own.data, read_from(helper.data))
     node_group.put(modifier, "Offsets", own)
     return own
+
+
+def part_with_copies(source):
+    """Gives a live source's modifier a helper that no duplicate shares, if one is at hand."""
+    modifier = None if source is None else modifier_stack.find(source)
+    if modifier is not None:
+        take_helper(source, modifier)
+
+
+def new_helper(source):
+    mesh = bpy.data.meshes.new(f"{source.name}{HELPER_SUFFIX}")
+    return bpy.data.objects.new(mesh.name, mesh)
 
 
 def fill_helper(context, source, modifier):
@@ -199,20 +215,24 @@ def leave_helper(modifier, live=False):
         discard_helper(helper)
 
 
-def drop_empty_helper(source):
+def drop_unused_helpers(source):
     """Called when live mode ends."""
     modifier = modifier_stack.find(source)
     if modifier is not None and carrier(source, modifier) == source.data:
         leave_helper(modifier)
+    if (unused := unused_helper(source)) is not None:
+        discard_helper(unused)
 
 
 def unused_helper(source):
-    """A helper that an earlier modifier of the source has left in the file, emptied; else None."""
-    helper = bpy.data.objects.get(f"{source.name}{HELPER_SUFFIX}")
-    if helper is None or helper.type != "MESH" or helper.library is not None or users_of(helper):
-        return None
-    empty(helper)
-    return helper
+    """A helper that an earlier modifier of the source, or live mode, has left in the file, emptied; or
+    None."""
+    for helper in bpy.data.objects:
+        is_named = helper.name.startswith(f"{source.name}{HELPER_SUFFIX}")
+        if is_named and helper.type == "MESH" and helper.library is None and users_of(helper) == 0:
+            empty(helper)
+            return helper
+    return None
 
 
 def empty(helper):

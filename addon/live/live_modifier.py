@@ -267,7 +267,7 @@ class LiveModifier:
             placement.give_back(source)
             if source.mode != "EDIT":
                 motion.restore(source, self.before)
-                motion.drop_empty_helper(source)
+                motion.drop_unused_helpers(source)
                 settings_of(source).moved_by = self.moved_by
                 if not self.was_silent:
                     motion.restore_armatures(source)
@@ -280,7 +280,7 @@ class LiveModifier:
         settings = settings_of(source)
         settings.live_kind = ""
         put_mark(source, "")
-        motion.drop_empty_helper(source)
+        motion.drop_unused_helpers(source)
         placement.keep_visibility(source)
         result, shape = settings.result, self.shown
         is_placed = result in ("REPLACE", "KEY") and shape is not None

@@ -8,7 +8,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from ..blender import host
+from ..blender import host, references
 from ..blender.language import translated
 from ..blender.object_references import in_scene, settings_of, source_of
 from ..carried import carrying
@@ -111,8 +111,12 @@ def disown(item):
         or item.session_uid in (live.begun, *live.returning, *live.paused)
     ):
         return
-    if any(session.number == settings.live_number for session in live.values()):
+    original = next((one for one in live.values() if one.number == settings.live_number), None)
+    if original is not None:
         forget_copy(item)
+        if original.display.in_place:
+            with references.between():
+                motion.part_with_copies(original.source.find())
     elif item.library is None:
         adopt(item)
     else:

@@ -69,7 +69,8 @@ class Sessions(dict):
         self.returning = {}  # {session_uid of a source: Former}, to be restarted after undo
         self.held = set()  # session_uids in `returning` whose shape then stays until a handle moves
         # session_uids of sources that are live in the step that was undone to, but cannot be now: the step is
-        # left as it is, since what is wrong there is mended by a further undo.
+        # left as it is, since what is wrong there is mended by a further undo, or by a change of what the
+        # shape follows.
         self.paused = set()
 
     def part_with(self, uid):
@@ -302,6 +303,19 @@ def watch(depsgraph):
         updates = Updates.of(depsgraph)
         for session in live.values():
             session.edits.note(updates)
+    if live.paused:
+        try_again({update.id.original.session_uid for update in depsgraph.updates})
+
+
+def try_again(changed):
+    """Has the paused sources restarted whose shapes follow one of these data-blocks (session_uids)."""
+    for source in [one for one in bpy.data.objects if one.session_uid in live.paused]:
+        kind = settings_of(source).live_kind
+        former = live.past.get(settings_of(source).live_number)
+        is_there = kind and former is not None and former.display.is_there()
+        if is_there and any(item.session_uid in changed for item in involved(source, kind)):
+            live.returning[source.session_uid] = former
+            host.start(poll_live, persistent=True)
 
 
 def follow_place(settings):
@@ -343,7 +357,9 @@ def return_all(context):
             with references.between():
                 begin(context, source, kind, former.keeps_shape)
         except UserError as error:
-            jobs.add_message("ERROR", about(source.name, error), {source.session_uid})
+            message = "ERROR", about(source.name, error)
+            if message not in jobs.messages():  # it may be tried often
+                jobs.add_message(*message, {source.session_uid})
     live.returning.clear()
 
 

@@ -237,6 +237,24 @@ def test_what_the_user_has_moved_aside_or_hidden_stays_so():
     assert seen() == []
 
 
+@pytest.mark.parametrize("output", ["WARP", "REMESH"])
+def test_what_a_live_result_measures_is_that_of_its_present_shape(output):
+    """An array's steps are as long as the mesh, whose size Blender keeps until it is told of a change."""
+    bar, _, moving = scenes.bar_with_handles()
+    bar.arapfields.result, bar.arapfields.output, bar.arapfields.resolution = "NEW", output, 20
+    bpy.ops.arapfields.live()
+    step()
+    result = bpy.data.objects["Bar_live"]
+    result.modifiers.new("Array", "ARRAY")
+    bpy.context.view_layer.update()
+    assert result.bound_box[6][0] > 0
+    moving.location.x += 0.5
+    step()
+    shown = scenes.world_points(result)
+    own = np.array([vertex.co for vertex in result.data.vertices])
+    assert np.isclose(np.ptp(shown[:, 0]), 2 * np.ptp(own[:, 0]), rtol=1e-5)
+
+
 def test_live_mode_shows_its_shape_alone_and_gives_back_what_was_seen():
     bar, _, moving = scenes.bar_with_handles()
     moving.location.z += 0.4

@@ -3,6 +3,7 @@
 
 import contextlib
 import functools
+import math
 
 import numpy as np
 import pytest
@@ -125,6 +126,77 @@ def test_live_mode_that_ended_by_an_error_comes_back_by_undo():
         world.settle()
     bar = bpy.data.objects["Bar2"]
     assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
+
+
+@few_centers
+@pytest.mark.parametrize("mend", ["handle", "mesh"])
+def test_live_mode_that_waits_goes_on_once_what_is_wrong_is_mended(mend):
+    """Undo has gone to a step in which it ended by an error; later steps show what it makes of them."""
+    build()
+    bar = bpy.data.objects["Bar2"]
+    take("live", bar)
+    bpy.ops.ed.undo_push(message="live")
+    world.settle()
+    if mend == "handle":
+        for empty in [entry.empty for entry in bar.arapfields.handles]:
+            bpy.data.objects.remove(empty)
+    else:
+        bar.data.vertices[0].co.x = math.nan
+    bpy.ops.ed.undo_push(message="wrong")
+    world.settle()
+    bpy.ops.ed.undo()
+    world.settle()
+    bar = bpy.data.objects["Bar2"]
+    assert bar.arapfields.live_kind and not sessions.is_live(bar)
+    if mend == "handle":
+        handle = scenes.cube_empty(scenes.world_points(bar)[0], (0.4, 0.4, 0.4))
+        scenes.activate(handle, bar)
+        assert bpy.ops.arapfields.add_handle() == {"FINISHED"}
+    else:
+        bar.data.vertices[0].co.x = bar.data.vertices[1].co.x
+    world.settle()
+    assert sessions.is_live(bar)
+    shown = scenes.world_points(bar)
+    bpy.ops.ed.undo_push(message="mended")
+    bpy.ops.ed.undo_push(message="another step")
+    bpy.ops.ed.undo()
+    world.settle()
+    bar = bpy.data.objects["Bar2"]
+    assert sessions.is_live(bar) and np.array_equal(scenes.world_points(bar), shown)
+
+
+@few_centers
+@pytest.mark.parametrize("linked", [False, True])
+@pytest.mark.parametrize("name", ["Bar0", "Bar2"])
+def test_a_duplicate_keeps_its_shape_whatever_the_live_original_does(name, linked):
+    """Also where modifiers make vertices or the mesh is shared, so that offsets lie on a helper."""
+    build()
+    bar = bpy.data.objects[name]
+    take("live", bar)
+    world.settle()
+    bpy.ops.ed.undo_push(message="live")
+    scenes.activate(bar)
+    bpy.ops.object.duplicate(linked=linked)
+    copy = bpy.context.object.name
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="duplicated")
+    world.settle()
+    shown = scenes.world_points(bpy.data.objects[copy])
+
+    def stays():
+        world.settle()
+        assert not world.dangling()
+        assert np.array_equal(scenes.world_points(bpy.data.objects[copy]), shown)
+
+    for way in (0.3, -0.2):
+        bpy.data.objects[name].arapfields.handles[1].empty.location.z += way
+        bpy.context.view_layer.update()
+        bpy.ops.ed.undo_push(message="moved")
+        stays()
+    for step in ("undo", "undo", "redo", "redo", "undo"):
+        getattr(bpy.ops.ed, step)()
+        stays()
+        assert sessions.is_live(bpy.data.objects[name])
 
 
 @few_centers

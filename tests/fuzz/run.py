@@ -2,6 +2,7 @@
 """Runs fuzz targets in separate processes; a new process continues after a case that ended one."""
 
 import json
+import os
 import queue
 import re
 import subprocess
@@ -14,6 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 HANG = 60.0  # seconds without output
 AT_ONCE = 2000  # cases per process
+ENVIRONMENT = {"MALLOC_PERTURB_": "165"}  # glibc overwrites freed memory, so that later reads of it fail
 
 
 @dataclass
@@ -44,7 +46,8 @@ def run_target(target, seed, count):
 def _run_process(findings, seed, first, count):
     """Runs cases in one process; returns the number of the next case."""
     command = [sys.executable, "-m", "tests.fuzz.worker", findings.target, str(seed), str(first), str(count)]
-    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen(command, cwd=ROOT, env=os.environ | ENVIRONMENT, **pipes)
     lines, errors = queue.Queue(), []
     readers = [
         threading.Thread(target=lambda: [lines.put(line) for line in process.stdout] + [lines.put(None)]),

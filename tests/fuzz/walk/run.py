@@ -10,9 +10,10 @@ import sys
 import tempfile
 import threading
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 
 import numpy as np
+
+from ..run import ENVIRONMENT, ROOT
 
 # How often each step of a walk is drawn, relative to others. The names are those of methods in steps.py.
 
@@ -100,7 +101,6 @@ def shortest(walk, fails):
 
 # Takes walks in a process of Blender's, which may crash or hang.
 
-ROOT = Path(__file__).resolve().parents[3]
 HANG = 300.0  # seconds that a step may take where others need the processors, too
 
 
@@ -130,7 +130,8 @@ class Blender:
     def start(self):
         self.crashes = tempfile.TemporaryFile()  # noqa: SIM115 (for the process)
         command = [self.python, "-m", "tests.fuzz.walk.worker"]
-        environment = os.environ | {"WALK_CRASHES": str(self.crashes.fileno()), "OMP_NUM_THREADS": "1"}
+        own = {"WALK_CRASHES": str(self.crashes.fileno()), "OMP_NUM_THREADS": "1"}
+        environment = os.environ | ENVIRONMENT | own
         self.process = subprocess.Popen(
             command,
             cwd=ROOT,
