@@ -8,6 +8,7 @@
 
 #include "core/decompositions.h"
 #include "core/errors.h"
+#include "core/smoothstep.h"
 #include "energies/kernels.h"
 #include "energies/ranges.h"
 
@@ -131,10 +132,7 @@ Vector GaussPreference::falloff(PointsIn directions) const {
   return result;
 }
 
-double falloff_at(double cosine) {
-  const double t = std::clamp((cosine - falloff_end) / (falloff_begin - falloff_end), 0.0, 1.0);
-  return t * t * (3.0 - 2.0 * t);
-}
+double falloff_at(double cosine) { return smoothstep(falloff_end, falloff_begin, cosine); }
 
 void require_sharpness(double sharpness) {
   require(sharpness >= 0.0 && sharpness <= 100.0, "sharpness", std::to_string(sharpness),

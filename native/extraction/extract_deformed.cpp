@@ -10,6 +10,7 @@
 #include "core/errors.h"
 #include "core/frame.h"
 #include "core/implicit.h"
+#include "core/smoothstep.h"
 #include "core/task.h"
 #include "distance/signed_distance.h"
 #include "extraction/batch_function.h"
@@ -73,12 +74,6 @@ Points some_rows(const Points& points, Index most) {
   Points result(count, 3);
   for (Index i = 0; i < count; ++i) result.row(i) = points.row(i * every);
   return result;
-}
-
-/// 0 up to `band`, 1 from twice that on, smooth between.
-double distance_blend(double distance, double band) {
-  const double t = std::clamp(distance / band - 1.0, 0.0, 1.0);
-  return t * t * (3.0 - 2.0 * t);
 }
 
 }  // namespace
@@ -164,7 +159,8 @@ void DeformedFunction::evaluate(ConstPointsRef<float> points, Eigen::Ref<VectorF
     if (inside[k] || distances[ambiguous[k]] < -probe_in_bands * shape_.band)
       exact[ambiguous[k]] = distances[ambiguous[k]];
   for (Index i = 0; i < mesh.rows(); ++i)
-    exact[i] += distance_blend(std::abs(distances[i]), shape_.band) * (distances[i] - exact[i]);
+    exact[i] +=
+        smoothstep(shape_.band, 2.0 * shape_.band, std::abs(distances[i])) * (distances[i] - exact[i]);
   inverted_ += static_cast<Index>(near.size());
   failures_ += static_cast<Index>(near.size() - inverted.size());
   values = (exact / frame_.scale).cast<float>();

@@ -7,6 +7,7 @@
 
 #include "core/parallel.h"
 #include "core/random.h"
+#include "core/smoothstep.h"
 #include "mesh/pieces.h"
 #include "mesh/sample_mesh.h"
 #include "sampling/local_thickness.h"
@@ -34,10 +35,6 @@ constexpr Index drawn_points = 2000, most_tries = 20, least_points = 500;
 constexpr std::uint64_t draw_stream = 7;
 /// Places farther from all points than so many spacings of theirs have no share.
 constexpr double near_spacings = 4.0;
-
-double diagonal(PointsIn points) {
-  return (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
-}
 
 /// Samples of thin parts beside another one.
 std::vector<Index> thin_samples(const SurfaceSamples& samples, const LocalThickness& thickness,
@@ -140,9 +137,8 @@ std::optional<FineRegion> region_of(const Points& thin, double size, const Point
   const Vector away = nearest_distances(thin, points);
   for (Index i = 0; i < count; ++i) {
     if (!is_thin[static_cast<std::size_t>(piece[static_cast<std::size_t>(i)])] || away[i] > end) continue;
-    const double t = std::clamp((no_share - away[i] / size) / (no_share - full_share), 0.0, 1.0);
     rows.push_back(i);
-    shares.push_back(t * t * (3.0 - 2.0 * t));
+    shares.push_back(smoothstep(no_share, full_share, away[i] / size));
   }
   if (std::ssize(rows) < least_points) return std::nullopt;
   result.points = points(rows, Eigen::all);
@@ -198,13 +194,13 @@ std::vector<FineRegion> fine_regions(const SurfaceSamples& samples, const LocalT
   const std::vector<Index> thin = thin_samples(samples, thickness, spacing);
   progress.check();
   const Points places = samples.points(thin, Eigen::all);
-  const double extent = diagonal(samples.points);
+  const double extent = diagonal_of(samples.points);
   Random random(0, draw_stream);
   std::vector<FineRegion> result;
   Points vertices(0, 3);
   for (const std::vector<Index>& cluster : clusters(places, beside * spacing)) {
     const Points own = places(cluster, Eigen::all);
-    const double size = diagonal(own);
+    const double size = diagonal_of(own);
     if (std::ssize(cluster) < least_thin || size > largest_share * extent) continue;
     if (vertices.rows() == 0) vertices = samples.frame.to_cube(samples.mesh->vertices);
     if (auto region = region_of(own, size, vertices, *samples.mesh, random))

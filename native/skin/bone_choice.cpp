@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/decompositions.h"
+#include "core/smoothstep.h"
 
 namespace arapfields {
 namespace {
@@ -211,9 +212,8 @@ LimbSides::LimbSides(const RigShape& rig, const PiecePoints& given, const std::v
       open = std::max(1.0 + (limb.parting - limb.along.dot(points.row(i))) / (fade * rig.extent),
                       std::clamp(closed, 0.0, 1.0) * std::min(1.0, 2.0 * same));
     }
-    open = std::clamp(open, 0.0, 1.0);
     sides[i] = rig.sides[own];
-    const double share = open * open * (3.0 - 2.0 * open);
+    const double share = smoothstep(0.0, 1.0, open);
     shares[i] = share < least_share ? 0.0 : share;
   }
 }

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "core/parallel.h"
+#include "core/smoothstep.h"
 #include "distance/signed_distance.h"
 
 namespace arapfields {
@@ -168,10 +169,7 @@ std::optional<FinePart> part_of(const RigShape& rig, Index hangs_on, const std::
   part.mesh.vertices = mesh.vertices(part.vertices, Eigen::all);
   part.mesh.triangles = Eigen::Map<const Triangles>(corners.data(), std::ssize(corners) / 3, 3);
   part.shares = away(part.vertices);
-  for (double& share : part.shares) {
-    const double t = std::clamp((no_share - share / size) / (no_share - full_share), 0.0, 1.0);
-    share = t * t * (3.0 - 2.0 * t);
-  }
+  for (double& share : part.shares) share = smoothstep(no_share, full_share, share / size);
   set_bones(skeleton, hangs_on, mesh.vertices, 0.5 * size, part);
   return part;
 }
