@@ -33,9 +33,8 @@ constexpr int rings_around = 2;
 /// which it is part of a detail, and from which on it is not; and the share of the style's weight for
 /// details.
 constexpr double detail_reach = 0.02, on_detail = 0.85, off_detail = 0.96, detail_weight = 0.1;
-/// Share of the last step by which the next one starts ahead: with the tolerance below, ten steps do as well
-/// as twelve at 0.8 with a tolerance of 0.1, and as sixteen at 0.6.
-constexpr double momentum = 0.85;
+/// Share of the last step by which the next one starts ahead: twelve steps then do as well as sixteen at 0.6.
+constexpr double momentum = 0.8;
 /// Share of the diagonal around folds that cannot be opened, where the surface goes back at first.
 constexpr double first_reach = 0.05;
 /// Residual of a global step's system, relative to that at its start: a tenth of this does no better.
