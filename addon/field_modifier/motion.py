@@ -227,12 +227,12 @@ def drop_unused_helpers(source):
 def unused_helper(source):
     """A helper that an earlier modifier of the source, or live mode, has left in the file, emptied; or
     None."""
-    for helper in bpy.data.objects:
-        is_named = helper.name.startswith(f"{source.name}{HELPER_SUFFIX}")
-        if is_named and helper.type == "MESH" and helper.library is None and users_of(helper) == 0:
-            empty(helper)
-            return helper
-    return None
+    named = [one for one in bpy.data.objects if one.name.startswith(f"{source.name}{HELPER_SUFFIX}")]
+    helpers = [one for one in named if one.type == "MESH" and one.library is None and users_of(one) == 0]
+    if not helpers:
+        return None
+    empty(helpers[0])
+    return helpers[0]
 
 
 def empty(helper):
