@@ -166,7 +166,9 @@ def test_covariances_are_those_of_points_that_the_field_moves():
     rng = np.random.default_rng(1)
     turned = axes(rest.rotations) * np.asarray(rest.scales, float)[:, None, :]
     for i in range(0, 40, 8):
-        points = rest.centers[i] + rng.normal(size=(40000, 3)) @ turned[i].T
+        normal = rng.normal(size=(40000, 3))
+        normal @= np.linalg.inv(np.linalg.cholesky(np.cov(normal.T))).T  # their covariance is exactly 1
+        points = rest.centers[i] + normal @ turned[i].T
         drawn = np.cov(field(points).T)
         assert np.linalg.norm(drawn - moved[i]) < DRAWN * np.linalg.norm(moved[i])
 
