@@ -91,6 +91,11 @@ def is_own_result(source, item):
     return named in (None, source) or not lists(named, item)
 
 
+def in_view(context):
+    """The objects of the view layer. After undo Blender 5.2 may list None in place of one that is gone."""
+    return [item for item in context.view_layer.objects if item is not None]
+
+
 def is_source(item):
     """Whether an object can be a source: a mesh, or a point cloud of splats."""
     return item.type == "MESH" or holds_splats(item)
@@ -133,7 +138,7 @@ def posed_by(rig, context):
     selected = [item for item in context.selected_objects if is_source(item)]
     if selected:
         return selected[0] if len(selected) == 1 else None
-    meshes = [item for item in context.view_layer.objects if is_source(item)]
+    meshes = [item for item in in_view(context) if is_source(item)]
     held = [item for item in meshes if any(entry.rig == rig for entry in settings_of(item).handles)]
     posed = [m for m in meshes if any(s.type == "ARMATURE" and s.object == rig for s in m.modifiers)]
     return next(iter(held), posed[0] if len(posed) == 1 else None)

@@ -150,7 +150,7 @@ def is_own(item):
 def handles_in_view(context):
     """[(source, entry)] of the visible handles with Empties of objects of which something is visible."""
     handles = []
-    for source in context.view_layer.objects:
+    for source in object_references.in_view(context):
         if not settings_of(source).handles or not object_references.is_source(source):
             continue
         if any(shape.visible_get() for shape in placement.source_and_results(source)):

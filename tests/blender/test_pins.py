@@ -443,6 +443,14 @@ def test_during_a_move_of_blenders_own_nothing_says_what_a_press_does(name, expe
 # Where a pin's place is at rest, on the screen, and what it is called.
 
 
+def test_what_is_gone_is_no_handle_in_view():
+    """Blender 5.2 lists None for it after undo."""
+    bar, fixed, moving = scenes.bar_with_handles()
+    layer = SimpleNamespace(objects=[None, *bpy.context.view_layer.objects])
+    found = pins.handles_in_view(SimpleNamespace(view_layer=layer))
+    assert [(source, entry.empty) for source, entry in found] == [(bar, fixed), (bar, moving)]
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.7])
 def test_a_pin_on_a_deformed_mesh_is_at_rest_where_its_place_was(turn):
     """For a mesh that has moved rigidly the place, the turn and the motion of the pin are known."""

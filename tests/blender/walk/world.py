@@ -10,7 +10,7 @@ from support.blender import scenes
 
 from addon.blender import mesh_arrays, modifier_stack, references, user_preferences
 from addon.blender.evaluation import is_disabled
-from addon.blender.object_references import owner_of, settings_of
+from addon.blender.object_references import in_view, owner_of, settings_of
 from addon.core.runtime.jobs import run_to_completion
 from addon.live import sessions
 from addon.results import placement
@@ -133,13 +133,13 @@ MAKERS = (bar, bar, generated, generated, keyed, posed, turned, curve, lattice)
 
 
 def sources():
-    return [item for item in bpy.context.view_layer.objects if item.type == "MESH"]
+    return [item for item in in_view(bpy.context) if item.type == "MESH"]
 
 
 def picture():
     """{full name: what is seen of an object of this file and said of it}, to be compared exactly."""
     found = {}
-    for item in bpy.context.view_layer.objects:
+    for item in in_view(bpy.context):
         if item.library is not None:
             continue
         settings, seen = settings_of(item), not is_disabled(item)
@@ -259,7 +259,7 @@ def build_shapes():
 
 def shape_sources():
     """The objects of the walk that are in the scene, by name; a walk may rename them."""
-    items = bpy.context.view_layer.objects
+    items = in_view(bpy.context)
     return [item for item in items if item.type == "MESH" and item.get("walks", item.name) in NAMES]
 
 
@@ -317,7 +317,7 @@ def difference(shown, expected):
 def everything():
     """{name: (place, digest of what is seen)} of all objects, to be compared bit for bit."""
     found = {}
-    for item in bpy.context.view_layer.objects:
+    for item in in_view(bpy.context):
         seen = hashlib.sha1(scenes.world_points(item).tobytes()).hexdigest() if item.type == "MESH" else ""
         found[item.name] = [round(x, 6) for row in item.matrix_world for x in row], seen
     return found

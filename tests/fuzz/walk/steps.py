@@ -10,7 +10,7 @@ from support.blender import scenes
 
 import addon
 from addon import registration
-from addon.blender.object_references import settings_of
+from addon.blender.object_references import in_view, settings_of
 from addon.core.errors import UserError
 from addon.live import sessions
 from addon.pin_tool import drag, pins
@@ -276,7 +276,7 @@ class AllSteps(Undoing):
         return things[self.rng.integers(len(things))] if things else None
 
     def other(self):
-        return self.one_of(item for item in bpy.context.view_layer.objects if item != self.source)
+        return self.one_of(item for item in in_view(bpy.context) if item != self.source)
 
     def call(self, operator, **given):
         """Calls an operator as a button does; what it refuses is no step."""
@@ -469,7 +469,7 @@ class AllSteps(Undoing):
         return f"{name}: {('removed', 'toggled', 'first')[way]}"
 
     def select(self):
-        item = self.one_of(bpy.context.view_layer.objects)
+        item = self.one_of(in_view(bpy.context))
         if item.hide_get() or item.hide_viewport:
             return None
         scenes.activate(item)
@@ -485,7 +485,7 @@ class AllSteps(Undoing):
         return self.call(bpy.ops.object.duplicate, linked=bool(self.chance(0.4)))
 
     def delete(self):
-        item = self.one_of(bpy.context.view_layer.objects)
+        item = self.one_of(in_view(bpy.context))
         if len(world.sources()) < 3 or item.hide_get() or item.hide_viewport:
             return None
         name = item.name
@@ -614,7 +614,7 @@ class AllSteps(Undoing):
         return f"{item.name} animated"
 
     def rename(self):
-        item = self.one_of(bpy.context.view_layer.objects)
+        item = self.one_of(in_view(bpy.context))
         if item.library:
             return None
         item.name = str(self.one_of(("Bar", "Object0", "Object1_offsets", "ARAP Fields", "Ü ö/\\")))
