@@ -126,7 +126,7 @@ def begin(context, source, kind="DEFORM", keeps_shape=False, way=None, goes_back
         warn(session)
     except UserError:
         if returned is not None:
-            live.paused.add(source.session_uid)
+            pause(source.session_uid)
             live.past.keep(settings_of(source).live_number, returned)
         elif (session or earlier) and not (earlier and goes_back):
             take_away(session or earlier)
@@ -285,7 +285,7 @@ def end_with_error(uid, session, error, stays=False):
     if changes:
         take_away(session)
     elif session.is_back:
-        live.paused.add(uid)
+        pause(uid)
     text = about(session.source.name, UserError("{error}; live mode ended", error=error))
     jobs.add_message("ERROR", text, {session.source.uid})
     return changes
@@ -305,6 +305,13 @@ def watch(depsgraph):
             session.edits.note(updates)
     if live.paused:
         try_again({update.id.original.session_uid for update in depsgraph.updates})
+
+
+def pause(uid):
+    """Has a source that is live in the file wait for a change. What its trial itself has changed is none."""
+    if not live.is_rendering:
+        bpy.context.view_layer.update()
+    live.paused.add(uid)
 
 
 def try_again(changed):
